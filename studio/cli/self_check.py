@@ -26,7 +26,7 @@ from studio.foundations.declaring import Terminal
 from studio.foundations.errors import StudioError
 from studio.foundations.numba_in_threads import numba
 from studio.foundations.package import assets_folder
-from studio.foundations.progress import unheard
+from studio.foundations.progress import no_progress
 from studio.operations.tracking import go_on, new_run
 from studio.runs.problem_source import ProblemSource
 from studio.search.likelihood.edge_region import CPU, DEVICE_MODULE, GPU
@@ -258,5 +258,5 @@ def _card() -> str:
 def _tracked() -> str:
     with tempfile.TemporaryDirectory() as folder:
         session = install_sample(Workspace(Path(folder)), "planar_arm")
-        tracked = go_on(new_run(session, last=1, knobs=QUICK, progress=unheard), progress=unheard)
+        tracked = go_on(new_run(session, last=1, knobs=QUICK, progress=no_progress), progress=no_progress)
     return f"in {tracked.seconds:.1f} s, compiling included"

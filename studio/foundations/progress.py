@@ -49,9 +49,6 @@ def no_progress(_step: str, _done: int, _total: int) -> None:
     """Progress that is not shown."""
 
 
-unheard = no_progress  # what the search and the doctor call it until they are renamed, too
-
-
 def time_left(taken: Sequence[tuple[float, float]], left: float) -> float | None:
     """Seconds that `left` further parts will take, None while that is not known to a factor of two.
 

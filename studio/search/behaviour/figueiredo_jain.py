@@ -24,7 +24,7 @@ import numpy as np
 
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BehaviourError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.search.behaviour.gaussian_mixture import GaussianMixture
 from studio.search.behaviour.mixture_kernels import losses_without, replace_component, shares_of
 
@@ -71,7 +71,7 @@ class Search:
 
 
 def fit_mixture(
-    points: Array, rng: np.random.Generator, search: Search, progress: Progress = unheard
+    points: Array, rng: np.random.Generator, search: Search, progress: Progress = no_progress
 ) -> tuple[GaussianMixture, tuple[Settled, ...]]:
     """The mixture of the shortest message for points (n, p), and what EM settled at on the way.
 

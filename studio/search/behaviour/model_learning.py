@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BehaviourError
-from studio.foundations.progress import Progress, unheard
+from studio.foundations.progress import Progress, no_progress
 from studio.search.behaviour.feature_space import FeatureSpace, feature_space
 from studio.search.behaviour.figueiredo_jain import FLOOR, Search, fit_mixture
 from studio.search.behaviour.gaussian_mixture import GaussianMixture
@@ -27,7 +27,7 @@ def learn_model(
     fps: float,
     settings: LearningSettings,
     rng: np.random.Generator,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     sources: Sequence[str] = (),
 ) -> BehaviourModel:
     """The behaviour in recordings of poses (F, D) on one body, all at `fps`; recordings are independent.
