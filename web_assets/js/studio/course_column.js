@@ -226,9 +226,7 @@ function CourseColumn() {
         class="icon"
         aria-label="Close the course"
         title="Close the course"
-        onClick=${() => {
-          isOpen.value = false;
-        }}
+        onClick=${() => into(isOpen)(false)}
       >
         ×
       </button>

@@ -1,7 +1,7 @@
 // Dialogs: a form, a list, a picture. One <dialog>, closed by Escape.
 
 import { byId, showPicture } from "../elements.js";
-import { Fragment, html, mount, useEffect, useRef, useSignal } from "./component.js";
+import { Fragment, html, into, mount, useEffect, useRef, useSignal } from "./component.js";
 import { Failure, Select } from "./parts.js";
 
 /** @type {HTMLDialogElement} */
@@ -126,9 +126,7 @@ export function Form({ heading, intro, action, danger = false, children, send, c
   const said = useSignal("");
   const alert = useRef(/** @type {HTMLElement | null} */ (null));
   useEffect(() => alert.current?.scrollIntoView({ block: "nearest" }), [wrong.value]);
-  const report = (/** @type {string} */ words) => {
-    said.value = words;
-  };
+  const report = into(said);
   const submit = async (event) => {
     event.preventDefault();
     isSent.value = true;

@@ -1,7 +1,7 @@
 // The command palette: all that can be found, by a few letters of its name.
 
 import { byId } from "../elements.js";
-import { html, mount, signal, useEffect, useLayoutEffect, useRef } from "./component.js";
+import { html, into, mount, signal, useEffect, useLayoutEffect, useRef } from "./component.js";
 import { askForFindable, findable } from "./findable.js";
 
 /** @import { Entry } from "./findable.js" */
@@ -59,6 +59,7 @@ function Search() {
   const take = (/** @type {number} */ at) => {
     // Before it acts: a dialog that closes gives the focus back to where it was.
     field.current?.closest("dialog")?.close();
+    isOpen.value = false;
     found[at]?.act();
   };
   const takeKey = (/** @type {KeyboardEvent} */ event) => {
@@ -114,12 +115,18 @@ function Palette() {
     if (isOpen.value) dialog.current?.showModal();
     else dialog.current?.close();
   }, [isOpen.value]);
-  const closed = () => {
+  // A dialog says a little later that it closed: it may be open again by then.
+  const closed = ({ currentTarget }) => into(isOpen)(currentTarget.open);
+  const takeKey = (/** @type {KeyboardEvent} */ event) => {
+    if (event.key !== "Escape") return;
+    event.preventDefault();
     isOpen.value = false;
   };
-  return html`<dialog ref=${dialog} class="palette" aria-label="Find" onClose=${closed}>
-    ${isOpen.value && html`<${Search} />`}
-  </dialog>`;
+  return html`
+    <dialog ref=${dialog} class="palette" aria-label="Find" onClose=${closed} onKeyDown=${takeKey}>
+      ${isOpen.value && html`<${Search} />`}
+    </dialog>
+  `;
 }
 
 /** Open it, or close it again. */
