@@ -44,9 +44,8 @@ export function addingOf(setup, isOpened, done) {
   async function sourceOf(files) {
     if (files.length) {
       const cancel = () => abort.abort();
-      const report = (/** @type {string} */ words, /** @type {number} */ share) => {
-        progress.value = { words, share, cancel };
-      };
+      const report = (/** @type {string} */ words, /** @type {number} */ share) =>
+        into(progress)({ words, share, cancel });
       return { upload: await uploadFiles(files, report, abort.signal) };
     }
     if (source.value.trim()) return { source: source.value.trim() };

@@ -101,11 +101,9 @@ export function modelOf(setup, loaded) {
 
   /** @param {FileList} files */
   const upload = (files) =>
-    uploadFiles(files, (words, share) => {
-      progress.value = { words, share };
-    }).finally(() => {
-      progress.value = null;
-    });
+    uploadFiles(files, (words, share) => into(progress)({ words, share })).finally(() =>
+      into(progress)(null),
+    );
 
   /** The calibration that is being computed got further. @param {any} state */
   async function hear(state) {

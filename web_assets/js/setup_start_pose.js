@@ -75,9 +75,7 @@ export function modelOf(setup, loaded) {
   async function waitFor(jobs, { identifier }, words) {
     const cancel = () => remove(`${jobs}/${identifier}`).catch(complain);
     try {
-      const report = (/** @type {any} */ job) => {
-        progress.value = progressOf(job, words, cancel);
-      };
+      const report = (/** @type {any} */ job) => into(progress)(progressOf(job, words, cancel));
       const ended = await followJob(`${jobs}/${identifier}`, report, () => isLeft);
       return ended?.state === "done" ? ended : null;
     } finally {
