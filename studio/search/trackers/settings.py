@@ -34,7 +34,7 @@ class AnnealedSettings(GuidedSettings):
         help="α: share of the particles that survive a layer (Eq. 12); lower is faster and misses more.",
     )  # fmt: skip
     layers: int = next_frame_knob(10, 1, 60, 1, help="M: annealing layers in a frame.")
-    particles: int = next_frame_knob(100, 1, 20000, 10, help="N: particles in every layer.")
+    particles: int = next_frame_knob(100, 1, 200000, 10, help="N: particles in every layer.")
     crossover: float = knob(
         0.5, 0.0, 1.0, 0.05, label="crossover share",
         help="Share of the particles that are made from two parents (Eq. 19).",
