@@ -21,6 +21,7 @@ from studio.search.trackers.tracker import SearchSpace
 THREADS = 128
 RECORDED = 4096
 """Particles of a layer's record at most."""
+FIRST_TIME, SECOND_TIME, ONE_BY_ONE = "first time", "second time", "one by one"
 
 
 @functools.cache
@@ -49,16 +50,20 @@ class DeviceRuns:
         self._turn = 0
 
     def _launch(self, key: tuple[object, ...], launch: Callable[[], None]) -> None:
-        """Launches one by one at their first time, recorded and made at once from the second on."""
+        """Launches one by one at their first time, recorded and made at once from the second on.
+
+        What is kept of them holds no frame: its memory goes to the next one.
+        """
         key = "recorded", *key
-        again = self._arrays.get(key, False)
-        if again is False:
+        again = self._arrays.setdefault(key, FIRST_TIME)
+        if again is FIRST_TIME:
+            self._arrays[key] = SECOND_TIME
+        elif again is SECOND_TIME:
+            again = self._arrays[key] = record_launches(launch, self._stream) or ONE_BY_ONE
+        if isinstance(again, str):
             launch()
-            self._arrays[key] = None
-            return
-        if again is None:
-            again = self._arrays[key] = record_launches(launch, self._stream) or launch
-        again()
+        else:
+            again()
 
     def _fetched(self, there: Any) -> NDArray[Any]:  # noqa: ANN401
         """An array on the host, when all that was launched is done."""

@@ -12,7 +12,7 @@ from simulated_search import COUNT, LAST, PLAN, SEEDS, SETTINGS, last_set, probl
 
 from studio.foundations import numba_on_devices
 from studio.foundations.errors import RunError, StudioError
-from studio.search.trackers import frame_loop
+from studio.search.trackers import device_runs, frame_loop
 from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilter
 from studio.search.trackers.annealing import anneal
 from studio.search.trackers.counted_numbers import as_normals, as_share, random_words
@@ -264,6 +264,16 @@ def test_what_a_card_does_not_do_the_processor_does(monkeypatch, problem, knobs)
     settings = AnnealedSettings(layers=2, particles=COUNT, **knobs)
     found, expected = (searched(one, space, poses, settings) for one in (Carded(weighting), weighting))
     np.testing.assert_array_equal(found[-1].poses, expected[-1].poses)
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_launches_are_recorded_at_their_second_time_and_hold_no_frame(monkeypatch, recorded):
+    made, again = [], (lambda: made.append("again")) if recorded else None
+    monkeypatch.setattr(device_runs, "record_launches", lambda launch, stream: again)
+    runs = SimpleNamespace(_arrays={}, _stream=None)
+    for frame in range(4):
+        device_runs.DeviceRuns._launch(runs, ("a layer",), lambda frame=frame: made.append(frame))
+    assert made == ([0, "again", "again", "again"] if recorded else [0, 1, 2, 3])
 
 
 def test_launches_that_cannot_be_recorded_are_made_one_by_one(monkeypatch):
