@@ -264,7 +264,7 @@ class WeighingDevice:
         factors: tuple[float, float, float],
     ) -> tuple[Array, Array]:
         """(N,) fitness and (N,) log-weights of poses (N, D). Raises BodyError where one is not finite."""
-        found = np.empty((2, len(poses)))
+        weights = np.empty((2, len(poses)))
         edges, problem = self.edges_of(limbs), ProblemOnDevice(self, frame, factors)
         with self._turn:
             parts: list[Any] = []
@@ -274,43 +274,40 @@ class WeighingDevice:
                 parts.append(part)
             first = 0
             for part in parts:
-                found[:, first : first + part.shape[1]] = part.copy_to_host(stream=self._weighing)
+                weights[:, first : first + part.shape[1]] = part.copy_to_host(stream=self._weighing)
                 first += part.shape[1]
             self._weighing.synchronize()
-        return found[0], found[1]
+        return weights[0], weights[1]
 
     def terms(
         self, poses: Array, frame: FrameOnDevice, limbs: NDArray[np.int64] | None = None
     ) -> tuple[Array, Array, Areas]:
         """Σe and Σr, each (N, V), and the areas of poses (N, D). Raises BodyError where one is not finite."""
         edges = self.edges_of(limbs)
-        found = np.empty((len(poses), self.views, SUMS))
+        sums = np.empty((len(poses), self.views, SUMS))
         with self._turn:
             first = 0
             for there in self._brought(poses):
                 count = there.shape[1]
-                sums = self.sum_maps(there, frame, edges, count, self._weighing, self.memory)
-                found[first : first + count] = sums.copy_to_host(stream=self._weighing)
+                of_part = self.sum_maps(there, frame, edges, count, self._weighing, self.memory)
+                sums[first : first + count] = of_part.copy_to_host(stream=self._weighing)
                 first += count
             self._weighing.synchronize()
         on_edges, within = self.samples(edges.shape[0])
-        counted = on_edges - found[..., LOST]
-        edge = np.where(counted > 0, found[..., EDGE_SUM] / (WORST * np.maximum(counted, 1)), 1.0)
+        counted = on_edges - sums[..., LOST]
+        edge = np.where(counted > 0, sums[..., EDGE_SUM] / (WORST * np.maximum(counted, 1)), 1.0)
         areas = Areas(
-            found[..., SHARED].astype(np.int64),
-            found[..., DRAWN].astype(np.int64),
+            sums[..., SHARED].astype(np.int64),
+            sums[..., DRAWN].astype(np.int64),
             frame.observed[0],
-            np.ascontiguousarray(found[..., OUTSIDE]),
+            np.ascontiguousarray(sums[..., OUTSIDE]),
         )
-        return edge, found[..., REGION_SUM] / (WORST * within), areas
+        return edge, sums[..., REGION_SUM] / (WORST * within), areas
 
     def bring(self, poses: Array, there: Any) -> None:  # noqa: ANN401
         """Fill `there` (D, N) with poses (N, D) of the host. Raises BodyError where one is not finite."""
         with self._turn:
-            pinned = self._pinned("all", poses.shape)
-            narrow(poses, pinned)
-            given = self.memory("all given", poses.shape, np.float32)
-            given.copy_to_device(pinned, stream=self._weighing)
+            given = self._sent("all", poses, self._weighing)
             grid = -(-len(poses) // POSES_A_BLOCK), POSES_A_BLOCK, self._weighing
             pose_kernels()[0][grid](given, there)
             self._weighing.synchronize()
@@ -324,10 +321,7 @@ class WeighingDevice:
             turn = number % 2
             if used[turn] is not None:
                 used[turn].synchronize()
-            pinned = self._pinned(f"pinned {turn}", part.shape)
-            narrow(part, pinned)
-            given = self.memory(f"given {turn}", part.shape, np.float32)
-            given.copy_to_device(pinned, stream=self._copying)
+            given = self._sent(f"part {turn}", part, self._copying)
             arrived = cuda.event()
             arrived.record(self._copying)
             arrived.wait(self._weighing)
@@ -337,11 +331,16 @@ class WeighingDevice:
             used[turn].record(self._weighing)
             yield there
 
-    def _pinned(self, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        key = name, shape
+    def _sent(self, name: str, poses: Array, stream: Any) -> Any:  # noqa: ANN401
+        """Poses (N, D) of the host on their way, in single precision, through memory of that name."""
+        key = name, poses.shape
         if key not in self._memory:
-            self._memory[key] = cuda.pinned_array(shape, np.float32)
-        return self._memory[key]
+            self._memory[key] = cuda.pinned_array(poses.shape, np.float32)
+        pinned = self._memory[key]
+        narrow(poses, pinned)
+        given = self.memory(name, poses.shape, np.float32)
+        given.copy_to_device(pinned, stream=stream)
+        return given
 
 
 def copied(memory: dict[str, Any], name: str, values: NDArray[Any]) -> Any:  # noqa: ANN401
@@ -378,10 +377,10 @@ def narrow_blocks(
 
 def rows_of_words(silhouettes: Silhouettes) -> list[NDArray[np.uint32]]:
     """Each view's silhouette as rows of 32-bit words: bit k of word w is pixel 32 w + k."""
-    found: list[NDArray[np.uint32]] = []
+    pictures: list[NDArray[np.uint32]] = []
     for base, words, width, height in silhouettes.maps.views.tolist():
         columns = -(-width // WINDOW_STEP)
         windows = silhouettes.maps.values[base : base + columns * words].reshape(columns, words)
         rows = windows[:: WORD // WINDOW_STEP, :height].T.astype(np.uint32)
-        found.append(np.ascontiguousarray(rows))
-    return found
+        pictures.append(np.ascontiguousarray(rows))
+    return pictures

@@ -13,6 +13,7 @@ import numpy as np
 
 from studio.foundations.numba_on_devices import cuda
 from studio.search.trackers.counted_numbers import as_normals, as_share, random_words
+from studio.search.trackers.layer_plan import WIDEST
 
 SEED, FRAME, LAYER = 0, 1, 2
 OF_RUN, OF_PARENTS, OF_CUTS, OF_NOISE = 0, 1, 2, 16
@@ -33,8 +34,6 @@ FITNESS, LOG_WEIGHT = 0, 1
 NO_PARENT = -1
 SUMMING = 512
 """Threads that sum up a run's particles: a power of two."""
-WIDEST = 128
-"""Most parameters of a body whose noise is correlated."""
 NEWTON_STEPS, CLOSE = 60, 1e-7
 SMALLEST, FARTHEST = 1e-9, 40.0
 BETA_LIMIT = 690.0

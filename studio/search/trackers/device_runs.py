@@ -67,9 +67,9 @@ class DeviceRuns:
 
     def _fetched(self, there: Any) -> NDArray[Any]:  # noqa: ANN401
         """An array on the host, when all that was launched is done."""
-        found = there.copy_to_host(stream=self._stream)
+        values = there.copy_to_host(stream=self._stream)
         self._stream.synchronize()
-        return found
+        return values
 
     def _rows(
         self,
@@ -89,8 +89,8 @@ class DeviceRuns:
         kernel("take_rows")[-(-rows // THREADS), THREADS, self._stream](
             poses, weights, numbers, run, count, step, taken, values
         )
-        found = self._fetched(taken)
-        return found[:-1], np.ascontiguousarray(self._fetched(values)[:, :-1]), found[-1]
+        kept = self._fetched(taken)
+        return kept[:-1], np.ascontiguousarray(self._fetched(values)[:, :-1]), kept[-1]
 
     def _copied(self, name: str, values: NDArray[Any]) -> Any:  # noqa: ANN401
         there = self._memory(name, values.shape, values.dtype.type)

@@ -18,6 +18,7 @@ import numpy as np
 from studio.foundations.errors import RunError, StudioError
 from studio.foundations.knobs import knobs_of
 from studio.search.likelihood.problem import FittedToPoses, WeighedOnDevice
+from studio.search.trackers.layer_plan import WIDEST
 from studio.search.trackers.particles import WeightError
 from studio.search.trackers.tracker import (
     HIDDEN,
@@ -35,8 +36,6 @@ from studio.search.trackers.tracker import (
     keyed_generator,
 )
 
-DEVICE_PARAMETERS = 128
-"""Most of a body whose particles a card keeps."""
 BEGINNINGS = 1 << 31
 """Numbers of layers from here on are those of the sets that a frame's searches begin with."""
 SEEDS = (1 << 64) - 1
@@ -272,7 +271,7 @@ class FrameSearch:
         """Whether a card can do a layer."""
         extra = self._state.particles.extra if self._state.particles is not None else {}
         fits = self.tracker.fits_device(layer, self.space, settings, extra)
-        return fits and len(self.space.names) <= DEVICE_PARAMETERS
+        return fits and len(self.space.names) <= WIDEST
 
     def _key(self, number: int) -> tuple[int, int, int]:
         """What a card's random numbers are counted from."""

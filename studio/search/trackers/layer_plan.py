@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 from studio.foundations.arrays import Array
 
+WIDEST = 128
+"""Most parameters of a body whose particles a card keeps."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Noise:
