@@ -1,7 +1,7 @@
 """What adding your own takes: everything that a tracker, a likelihood, an export or a calibration format is made of.
 
-Each name is imported on first use, like the verbs of `studio`. The guide's page *Adding your own* uses them all but a
-few.
+Each name is imported on first use, like the verbs of `studio`. The guide's page *Adding your own* uses most of
+them.
 """
 
 import importlib
@@ -20,7 +20,13 @@ _NAMES = {
     "studio.results.export.task": ("ExportTask", "Written"),
     "studio.search.likelihood.catalogue": ("LossLimit", "Weighting"),
     "studio.search.likelihood.hard_priors": ("HardPriors",),
-    "studio.search.likelihood.problem": ("TRUNK_FIRST", "WHOLE_BODY", "FrameLikelihood"),
+    "studio.search.likelihood.problem": (
+        "TRUNK_FIRST",
+        "WHOLE_BODY",
+        "BaseFrameLikelihood",
+        "FrameLikelihood",
+        "Shares",
+    ),
     "studio.search.trackers.annealing": ("Annealed", "anneal"),
     "studio.search.trackers.layer_record": ("layer_record",),
     "studio.search.trackers.particles": (

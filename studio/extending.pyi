@@ -26,7 +26,9 @@ from studio.search.likelihood.catalogue import Weighting as Weighting
 from studio.search.likelihood.hard_priors import HardPriors as HardPriors
 from studio.search.likelihood.problem import TRUNK_FIRST as TRUNK_FIRST
 from studio.search.likelihood.problem import WHOLE_BODY as WHOLE_BODY
+from studio.search.likelihood.problem import BaseFrameLikelihood as BaseFrameLikelihood
 from studio.search.likelihood.problem import FrameLikelihood as FrameLikelihood
+from studio.search.likelihood.problem import Shares as Shares
 from studio.search.trackers.annealing import Annealed as Annealed
 from studio.search.trackers.annealing import anneal as anneal
 from studio.search.trackers.layer_record import layer_record as layer_record

@@ -1,1 +1,4 @@
-"""The papers' experiments, the suite's recipes, benchmarks: they use the house, and only two commands use them."""
+"""The papers' experiments, recipes that are drawn from a seed, benchmarks.
+
+They use the house; only two command modules of `cli` use them.
+"""

@@ -330,7 +330,7 @@ def correct(
     Raises SettingsError unless exactly one pose is given.
     """
     stored = open_run(run)
-    new = corrected_run(stored, frame, pose, from_track, back_to, name)
+    new = set_up_correction(stored, frame, pose, from_track, back_to, name)
     if back_to is None:
         return go_on(new, progress=progress)
     done = 0
@@ -385,20 +385,20 @@ def branch(
 
     Raises SettingsError where no knob differs.
     """
-    return go_on(branched_run(run, frame, knobs, name), progress=progress)
+    return go_on(set_up_branch(run, frame, knobs, name), progress=progress)
 
 
 @keeping_in_place
-def branched_run(
+def set_up_branch(
     run: RunName, frame: int, knobs: Mapping[str, object] | None = None, name: str = ""
 ) -> StoredRun:
-    """The run of `branch`, before anything is tracked."""
+    """The run that `branch` tracks, not begun."""
     stored = open_run(run)
     return prepare_branch(session_of(stored), stored, frame, knobs, name)
 
 
 @keeping_in_place
-def corrected_run(
+def set_up_correction(
     run: StoredRun,
     frame: int,
     pose: Pose | None = None,
@@ -407,7 +407,7 @@ def corrected_run(
     name: str = "",
     source: str = "",
 ) -> StoredRun:
-    """The run of `correct`, before anything is tracked. source : where the pose came from, in words."""
+    """The run that `correct` tracks, not begun. source : where the pose came from, in words."""
     if (pose is None) == (not from_track):
         raise SettingsError("A corrected frame needs a pose.", "Give one, or the track to take it from.")
     if pose is None:

@@ -19,7 +19,7 @@ from studio.search.settings import (
     values,
 )
 from studio.sessions.names import free_name, name_from
-from studio.sessions.session import Session, numbered
+from studio.sessions.session import Session, make_numbered_run
 from studio.sessions.stored_run import StoredRun
 
 
@@ -65,7 +65,7 @@ def prepare_branch(
         if not is_whole:
             keep_moved(made_run, version, moved)
 
-    return numbered(session, made, name, lambda record: new_folder(run, record, frame, leave_moved))
+    return make_numbered_run(session, made, name, lambda record: new_folder(run, record, frame, leave_moved))
 
 
 MOST_NAMED = 2

@@ -23,7 +23,7 @@ from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
 from studio.search.settings import settings_from_values
-from studio.sessions.session import Session, numbered
+from studio.sessions.session import Session, make_numbered_run
 from studio.sessions.stored_run import StoredRun
 
 
@@ -58,7 +58,7 @@ def prepare_correction(
         first=record.first if backwards_to is None else min(record.first, backwards_to),
     )
     last = frame if backwards_to is None else None
-    return numbered(session, changed, name, lambda record: new_folder(run, record, last))
+    return make_numbered_run(session, changed, name, lambda record: new_folder(run, record, last))
 
 
 def track_backwards(

@@ -42,7 +42,7 @@ from studio.runs.setup.contrast import KnownPoses, contrast_notes
 from studio.runs.setup.initialising import InitialPose, initialise
 from studio.runs.setup.mask_quality import look_before_the_first_run
 from studio.runs.setup.session_settings import session_settings
-from studio.runs.setup.shape_on_the_way import session_shape
+from studio.runs.setup.shape_on_the_way import fit_session_shape
 from studio.runs.setup.silhouette_faults import accepted_faults
 from studio.runs.setup.start_pose_file import frame_of_file, start_pose_from_file
 from studio.search.likelihood.catalogue import WEIGHTINGS
@@ -50,7 +50,7 @@ from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_tabl
 from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
-from studio.sessions.session import Session, free_run_name, numbered
+from studio.sessions.session import Session, free_run_name, make_numbered_run
 from studio.sessions.stored_run import StoredRun
 
 DESPITE = "Tracked despite: "
@@ -191,7 +191,7 @@ def prepare_run(
         )
     before = dict(tree.dimensions)
     if fit_shape and not live and start is not None:
-        tree, start, words = session_shape(session, tree, settings, start, first, progress)
+        tree, start, words = fit_session_shape(session, tree, settings, start, first, progress)
         notes = (*notes, *([words] if words else []))
     record = RunRecord(
         name=name or free_run_name(session),
@@ -219,7 +219,7 @@ def prepare_run(
     )
     text = body_file_text(body or tree.name, session.body_folders)
     path = model.path if model else None
-    return numbered(session, record, name, lambda record: session.new_run(record, text, path))
+    return make_numbered_run(session, record, name, lambda record: session.new_run(record, text, path))
 
 
 def given_pose(

@@ -79,8 +79,8 @@ def read_evidence(session: Session) -> SessionEvidence:
     return _RECORD.read(session.path / EVIDENCE_NAME, SessionEvidence())
 
 
-def given_backgrounds(session: Session) -> Session:
-    """The session with its given backgrounds in use, where cleaned ones were."""
+def use_given_backgrounds(session: Session) -> Session:
+    """Put the session's given backgrounds back into use, where cleaned ones were; gives the session as it is then."""
     evidence = read_evidence(session)
     if not evidence.given:
         return session

@@ -329,10 +329,10 @@ def start_pose_files(folder: Path) -> tuple[Path, ...]:
     return (*((own,) if own.is_file() else ()), *sorted(folder.glob(OTHERS_START_POSE.format("*"))))
 
 
-def numbered(
+def make_numbered_run(
     session: Session, record: RunRecord, name: str, make: Callable[[RunRecord], StoredRun]
 ) -> StoredRun:
-    """The run made of a record. name : that was requested; without one, the next free number is taken.
+    """Make the run of a record. name : that was requested; without one, the next free number is taken.
 
     Raises what `make` raises.
     """

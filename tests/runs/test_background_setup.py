@@ -19,11 +19,11 @@ from studio.runs.setup.background_setup import set_up_background
 from studio.runs.setup.clean_plates import median_of_empty
 from studio.runs.setup.session_settings import session_settings
 from studio.sessions.background_files import (
-    given_backgrounds,
     polygon_exclusion,
     read_evidence,
     set_backgrounds,
     set_exclusion,
+    use_given_backgrounds,
     write_evidence,
 )
 from studio.sessions.importers.importing import ImportOptions, import_source
@@ -125,7 +125,7 @@ def test_who_stood_in_a_plate_is_cleaned_away(session: Session, tmp_path: Path) 
     assert wrong[30:110, 20:40].mean() < 0.05
     assert wrong.mean() < 0.04
     assert setup.knobs["background_model"] == "gaussian"
-    back = given_backgrounds(now)
+    back = use_given_backgrounds(now)
     assert back.manifest.footage.cameras[0].background == "background/cam0.png"
 
 

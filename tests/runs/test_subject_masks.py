@@ -19,8 +19,10 @@ from studio.runs.setup.background_setup import set_up_background
 from studio.runs.setup.mask_quality import mask_quality
 from studio.runs.setup.session_settings import session_settings
 from studio.runs.setup.subject_masks import WholeMasks, cut_frames, seen_subjects
+from studio.runs.setup.workflow import MADE_WORDS, background_step
 from studio.runs.together import track_together
 from studio.search.settings import default_settings
+from studio.sessions.background_files import HOMES
 from studio.sessions.session import Session
 
 FRAMES = 18
@@ -124,6 +126,10 @@ def test_masks_of_two_are_not_called_usable(made: TwoPeople) -> None:
     assert "2 subjects" in found.in_words()
 
 
+def test_masks_of_every_source_have_words() -> None:
+    assert set(MADE_WORDS) == set(HOMES)
+
+
 @pytest.mark.parametrize("who", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_others_are_cut_from_the_masks(people: TwoPeople, who: int) -> None:
     set_up_background(people.session, "masks", subject_at=people.places()[who])
@@ -133,6 +139,7 @@ def test_the_others_are_cut_from_the_masks(people: TwoPeople, who: int) -> None:
     # Whom to follow can be asked again: the masks of all are kept.
     set_up_background(session, "subject", subject_at=people.places()[1 - who])
     assert_cut_well(session, people, 1 - who)
+    assert "one subject" in background_step(Session(session.path)).words
 
 
 def test_nobody_at_a_place_is_an_error_that_says_where_they_stand_and_changes_nothing(

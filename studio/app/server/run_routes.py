@@ -23,7 +23,7 @@ from studio.operations.jobs import commands
 from studio.operations.jobs.search_pace import MOST_SECONDS, PaceView, pace_view
 from studio.operations.overview import LogLines, RunDetail, RunLine, RunList, run_line, run_lines, run_log
 from studio.operations.overview import run_detail as detail_of
-from studio.operations.tracking import branch, branched_run, new_run
+from studio.operations.tracking import branch, new_run, set_up_branch
 from studio.operations.trash import TrashEntry, trash_entry
 from studio.sessions.stored_run import StoredRun
 
@@ -106,7 +106,7 @@ def make_branch(
     """A new run with this one's frames before a frame, ready to be started: it and all after it are tracked with other
     knobs (those that were moved in this run, where none are given). This run stays as it is.
     """
-    made = branched_run(run, **arguments)
+    made = set_up_branch(run, **arguments)
     app.events.session_changed(session.name, made.name)
     return run_line(made.summary(), session)
 

@@ -18,7 +18,7 @@ from studio.foundations.knobs import Knob, knobs_of
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob, Work
 from studio.operations.results import check as check_run
 from studio.operations.results import evaluate, read_track, refine, smooth
-from studio.operations.tracking import correct, corrected_run, track_back
+from studio.operations.tracking import correct, set_up_correction, track_back
 from studio.operations.tracks import (
     CheckAnswer,
     LandmarksLine,
@@ -142,7 +142,7 @@ async def begin_correction(
     app: App,
 ) -> TrackJobState:
     """Make a run that begins again in a frame. Forwards it is ready to be started; backwards it is tracked here."""
-    made = await asyncio.to_thread(corrected_run, run, **arguments, source="set in the studio")
+    made = await asyncio.to_thread(set_up_correction, run, **arguments, source="set in the studio")
     app.events.session_changed(session.name, made.name)
 
     def work(job: Job) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 Each works while a frame is being annealed: it is served between two layers. A command names the run that it is about:
 that run is opened first if it is not open, in one step with what the command does, so no two windows can get between
-opening and starting. While another run is tracked it is refused, and only `Start` waits for its turn.
+opening and starting. While another run is tracked it is refused; only `Start` waits for its turn, and `Open` pauses the
+other run.
 """
 
 import time

@@ -2,7 +2,7 @@
 evaluations a frame, the same seeds.
 
 A comparison is a plan, its trials (one a tracker and seed, any of them in any process) and the conclusion from all of
-them: `trials`, `conclude`. Trials are made and measured as those of the experiments are (`tracking_trials`).
+them: `trials`, `conclude`. Trials are made and measured as those of the experiments are (`tracked`).
 """
 
 import hashlib

@@ -57,12 +57,12 @@ from studio.sessions.background_files import (
     SessionEvidence,
     change_evidence,
     forget_unused_masks,
-    given_backgrounds,
     given_masks_of,
     made_masks,
     read_evidence,
     set_exclusion,
     use_cleaned,
+    use_given_backgrounds,
     use_given_masks,
     write_evidence,
 )
@@ -306,7 +306,7 @@ def _set_up(
     elif source == "masks":
         session = use_given_masks(session)
     else:
-        session = given_backgrounds(session)
+        session = use_given_backgrounds(session)
     if source == "combined" and len(session.manifest.footage.cameras) >= CLEANING_VIEWS:
         settings = _settings(session, {"background_model": "combined", **chosen})
         plates = clean_plates(session, settings, progress=progress)

@@ -87,7 +87,7 @@ _RECORD = RecordFile(
 )
 
 
-def session_shape(
+def fit_session_shape(
     session: Session,
     body: BodyModel,
     settings: RunSettings,

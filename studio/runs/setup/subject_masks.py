@@ -1,6 +1,6 @@
 """The masks of one of several subjects: whom the visual hull shows in the first frame, and what is his after it.
 
-The masks in use are those of all who are in view (`whole_masks`); the pieces of their hull are followed from frame to
+The masks in use are those of all who are in view (`WholeMasks`); the pieces of their hull are followed from frame to
 frame (`evidence.volume.hull_subjects`), and each pixel of a mask goes to those whose piece lies behind it
 (`evidence.shared_masks`). Subjects that touch are parted roughly; `together` tracks their bodies for that.
 """

@@ -27,6 +27,7 @@ from studio.sessions.background_files import (
     CHOSEN_MASKS,
     PERSON_MASKS,
     STROKE_MASKS,
+    SUBJECT_MASKS,
     has_made_masks,
     home_of_masks,
     read_evidence,
@@ -74,6 +75,7 @@ MADE_WORDS = {
     PERSON_MASKS: "the person, cut out by a network",
     STROKE_MASKS: "cut out by brush strokes",
     CHOSEN_MASKS: "each camera's best source",
+    SUBJECT_MASKS: "one subject, cut from the masks",
 }
 """What the studio's own masks are, by where they lie."""
 

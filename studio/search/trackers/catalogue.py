@@ -35,7 +35,8 @@ def knobs_for_evaluations(tracker: str, evaluations: int, layers: int = 10) -> d
     """Knobs by flat name with which a tracker evaluates about `evaluations` poses a frame.
 
     Trackers are compared at equal evaluations, which take nearly all of a frame's time (Fleischmann et al. 2012,
-    section 3). Raises SettingsError where the number is too small or too large, NotFoundError for an unknown tracker.
+    section 3). Raises SettingsError where the number is too small or too large, UnknownMemberError for an unknown
+    tracker.
     """
     chosen = TRACKERS[tracker]
     least = chosen.least_evaluations(layers)

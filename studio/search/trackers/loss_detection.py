@@ -10,7 +10,7 @@ Three answers:
 
 The weight of a pose depends on clothes, light and masks as much as on the pose, so it is compared with the run's own
 median over its last well tracked frames, in units of their own spread (1.4826 × the median distance from the median)
-but never of less than the weighting's usual one (`Weighting.loss`). Overlap is f_s (`weighting.silhouette_areas`): it
+but never of less than the weighting's usual one (`Weighting.loss`). Overlap is f_s (`likelihood.silhouette_areas`): it
 means the same for every weighting, and serves in the first frames, before there is a distribution.
 
 Measured with the annealed filter, 1000 evaluations, on rendered footage: the twin of the Lee walk at 20 Hz, a circle

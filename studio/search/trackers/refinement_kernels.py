@@ -1,7 +1,7 @@
 # pyright: standard
 """Normal equations of outlines against silhouettes, solved by each step of `refinement`.
 
-Outlines are the quadrilaterals A0 A1 B1 B0 of the limbs in each view (`weighting.outlines`). Only what lies on the
+Outlines are the quadrilaterals A0 A1 B1 B0 of the limbs in each view (`likelihood.outlines`). Only what lies on the
 border of their union counts: points of an outline inside another limb do not. Every distance is in mm at the
 body (pixels times the view's mm per pixel); its loss is that of Geman & McClure, ρ(d) = d² / (1 + d² / c²), so that
 pixels that the body does not explain (hair, a shadow in the mask) pull little.

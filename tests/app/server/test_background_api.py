@@ -107,7 +107,7 @@ def test_a_failure_leaves_backgrounds_as_they_were(studio: Studio, monkeypatch: 
     def fails(*_: object, **__: object) -> None:
         raise FootageError("The clip ends.", "Give another.")
 
-    monkeypatch.setattr("studio.runs.setup.background_setup.given_backgrounds", fails)
+    monkeypatch.setattr("studio.runs.setup.background_setup.use_given_backgrounds", fails)
     studio.client.post(f"{PLACE}/background", json={"source": "median"})
     assert studio.ended(f"{PLACE}/background", "job")["message"] == "The clip ends."
     assert not (studio.workspace.session("take1").path / "evidence.json").exists()

@@ -39,7 +39,7 @@ from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.results.drawing_footage.real_data import PREFIX, real_data_folder
 from studio.results.evaluation.errors import limb_of_markers, lost_mm
 from studio.runs.limbs_elsewhere import LimbsElsewhere, changed_pixels
-from studio.runs.setup.shape_on_the_way import session_shape
+from studio.runs.setup.shape_on_the_way import fit_session_shape
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, default_settings
 from studio.search.trackers.agreement import FAR_MM, Agreement, limb_names
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
@@ -122,7 +122,7 @@ def plant(
     session = cache.session(clip)
     settings = default_settings(DEFAULT_TRACKER, DEFAULT_WEIGHTING)
     cameras, tree = session.cameras(), session.body(BODY)
-    body, _, _ = session_shape(session, tree, settings, pose_on_truth(session, tree, 0), 0)
+    body, _, _ = fit_session_shape(session, tree, settings, pose_on_truth(session, tree, 0), 0)
     whole, three = Looking(body, cameras), Looking(body, cameras[:3])
     for frame in evenly_spread(session.manifest.frame_count, frames):
         evidence = cache.evidence(session, cameras, int(frame), settings.evidence, "proximity")
