@@ -36,6 +36,7 @@ _NAMES = {
         "weighted_mean",
         "weighted_variance",
     ),
+    "studio.search.trackers.random_numbers": ("RandomNumbers",),
     "studio.search.trackers.shared_knobs": ("SearchSettings", "start_repeats"),
     "studio.search.trackers.tracker": (
         "Estimate",

@@ -37,6 +37,7 @@ from studio.search.trackers.particles import uniform_poses as uniform_poses
 from studio.search.trackers.particles import unweighted as unweighted
 from studio.search.trackers.particles import weighted_mean as weighted_mean
 from studio.search.trackers.particles import weighted_variance as weighted_variance
+from studio.search.trackers.random_numbers import RandomNumbers as RandomNumbers
 from studio.search.trackers.shared_knobs import SearchSettings as SearchSettings
 from studio.search.trackers.shared_knobs import start_repeats as start_repeats
 from studio.search.trackers.tracker import Estimate as Estimate

@@ -48,6 +48,7 @@ from studio.runs.setup.start_pose_file import frame_of_file, start_pose_from_fil
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_table, values
 from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.random_numbers import COUNTED
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name, make_numbered_run
@@ -211,6 +212,7 @@ def prepare_run(
         start_pose=None if start is None else tuple(float(value) for value in start),
         start_source=source,
         software=software_version(),
+        random_numbers=COUNTED,
         notes=tuple(notes),
         behaviour=model.name if model else "",
         live=live,

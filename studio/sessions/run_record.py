@@ -34,7 +34,8 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     none: other frames are that run's. corrected : the frame that restarts at corrected_pose. backwards_to : None
     where the frames after it follow from it; else these are the old ones, and from it down to this frame each was
     tracked from the one after it. subject_dimensions : the
-    subject's, where the first frames gave the body another shape; empty where they did not.
+    subject's, where the first frames gave the body another shape; empty where they did not. random_numbers : the kind
+    that its search uses ("counted": `search.trackers.random_numbers`), "" if it was begun before they had a name.
     """
 
     schema: int = SCHEMA_VERSION
@@ -64,6 +65,7 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     corrected_pose: tuple[float, ...] | None = None
     backwards_to: int | None = None
     subject_dimensions: dict[str, float] = {}
+    random_numbers: str = ""
 
     def is_restarted(self, frame: int) -> bool:
         """Whether a frame was started by a correction: the corrected one, or one that was tracked backwards from it."""

@@ -1,5 +1,6 @@
 """A live run tracks the newest frame, says what it dropped, and replays bit for bit."""
 
+import msgspec
 import numpy as np
 import pytest
 from live_driving import driving, live_request, live_run
@@ -12,8 +13,10 @@ from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.search.settings import changed_settings
+from studio.search.trackers.random_numbers import COUNTED
 from studio.search.trackers.recovery_settings import INITIALISE, SPREAD
 from studio.sessions.file_checksums import check_files
+from studio.sessions.run_record import write_run_record
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -102,6 +105,20 @@ def test_given_the_frames_everything_replays_bit_for_bit(session_on_disk: Sessio
             assert np.array_equal(first.poses, second.poses)
             assert np.array_equal(first.log_weights, second.log_weights)
         assert one.result(newest).settings_version == other.result(newest).settings_version == 2
+
+
+def test_a_run_of_other_random_numbers_is_not_replayed(session_on_disk: Session) -> None:
+    """One of before they were counted, as its record says."""
+    run = live_run(session_on_disk)
+    with driving(session_on_disk, run) as drive:
+        drive.frame(1.6 * FRAME)
+    assert run.record.random_numbers == COUNTED
+    write_run_record(run.folder, msgspec.structs.replace(run.record, random_numbers=""))
+    before = session_on_disk.run(run.name)
+    with pytest.raises(RunError, match="drew their random numbers in turn") as caught:
+        prepare_replay(session_on_disk, before)
+    assert f"studio of {before.record.created[:10]}" in caught.value.hint
+    assert [known.name for known in session_on_disk.runs()] == [run.name]
 
 
 def test_other_frames_give_another_run(session_on_disk: Session) -> None:

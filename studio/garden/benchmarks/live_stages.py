@@ -26,7 +26,8 @@ from studio.search.likelihood.blobs import BlobLikelihood
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS
-from studio.search.trackers.tracker import FilterState, generator, start_of
+from studio.search.trackers.random_numbers import RandomNumbers
+from studio.search.trackers.tracker import FilterState, start_of
 from studio.sessions.session import Session
 
 TRACKER, WEIGHTING = "behaviour", "blobs"
@@ -117,13 +118,15 @@ def _measured(session: Session, model: Path, progress: Progress | None) -> dict[
         clock.lap("decoding")
         problem = likelihood.problem(maker.evidence(frame))
         clock.lap("reconstruction")
-        particles = tracker.begin_frame(generator(0, frame, -1), carried, space, settings.tracker)
+        particles = tracker.begin_frame(
+            RandomNumbers.of_beginning(0, frame), carried, space, settings.tracker
+        )
         clock.lap("prediction and evaluation")
         expected = tracker.expectations(particles, space, settings.tracker)
         informed = problem.expecting(expected, carried.memory)
         clock.lap("blob fitting")
         weighed, _ = tracker.step_layer(
-            generator(0, frame, 0), particles, 0, informed, space, settings.tracker
+            RandomNumbers(0, frame, 0), particles, 0, informed, space, settings.tracker
         )
         pose = tracker.end_frame(weighed, space, settings.tracker).pose
         clock.lap("prediction and evaluation")

@@ -16,6 +16,7 @@ from studio.runs.live.live_problems import LiveProblems
 from studio.runs.live.live_run import LiveRun
 from studio.runs.problem_source import ProblemSource
 from studio.search.settings import RunSettings, SettingsHistory, settings_from_values
+from studio.search.trackers.random_numbers import COUNTED
 from studio.sessions.manifest import now
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME
 from studio.sessions.session import Session, free_run_name
@@ -35,13 +36,20 @@ class Comparison:
 
 
 def prepare_replay(session: Session, run: StoredRun, name: str = "") -> StoredRun:
-    """A new run with the frames and settings of a live one. Raises RunError for a run that was not live or has no
-    frames, SessionError if the name is taken.
+    """A new run with the frames and settings of a live one. Raises RunError for a run that was not live, has no frames
+    or used other random numbers, SessionError if the name is taken.
     """
     record = run.record
     with run.results() as results:
         if not record.live or not results.done():
             raise RunError(f"Run '{run.name}' has no frames that were tracked live.", "Choose a live run.")
+    if record.random_numbers != COUNTED:
+        raise RunError(
+            f"Run '{run.name}' was begun when searches drew their random numbers in turn; now they count them, and its "
+            "frames would come out otherwise.",
+            f"Replay it with a studio of {record.created[:10]}, or track its frames as a new run: "
+            f"studio track {session.name}.",
+        )
     bodies = sorted((run.folder / BODY_FOLDER).glob("*.toml"))
     following = msgspec.structs.replace(
         record,

@@ -45,7 +45,8 @@ from studio.search.trackers.particles import (
     weigh,
     weighted_variance,
 )
-from studio.search.trackers.resampling import draw, equal_draw
+from studio.search.trackers.random_numbers import RandomNumbers
+from studio.search.trackers.resampling import draw, draw_others, equal_draw
 from studio.search.trackers.settings import PRESETS, VARIANTS, AnnealedSettings, layer_survivals
 from studio.search.trackers.tracker import (
     NO_PARENT,
@@ -80,20 +81,20 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         return 2 * layers
 
     def begin_frame(
-        self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: AnnealedSettings
+        self, numbers: RandomNumbers, previous: FilterState, space: SearchSpace, settings: AnnealedSettings
     ) -> ParticleSet:
         """Step 1, 2 and 7: the unweighted set of the first layer, the last frame's plus B_0 (Eq. 9, 10)."""
         if previous.particles is None:
-            return unweighted(uniform_poses(rng, settings.particles, space))
-        carried = _carried(rng, previous.particles, settings)
+            return unweighted(uniform_poses(numbers, settings.particles, space))
+        carried = _carried(numbers, previous.particles, settings)
         if is_guided(space, settings.prediction):
-            return guided_set(rng, previous, carried, space, settings)
+            return guided_set(numbers, previous, carried, space, settings)
         predicted = expected(previous.particles.poses[carried], previous, settings.dynamics)
-        return first_set(rng, predicted, space, settings)
+        return first_set(numbers, predicted, space, settings)
 
     def step_layer(
         self,
-        rng: np.random.Generator,
+        numbers: RandomNumbers,
         particles: ParticleSet,
         layer: int,
         problem: FrameLikelihood,
@@ -103,7 +104,7 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         """Steps 3 to 5: weigh (Eq. 3, 6, 11, 12), draw, cross (Eq. 19) and spread (Eq. 7, 13 or 18)."""
         guided = STATES in particles.extra
         if layer == 0:
-            particles = settled_set(rng, particles, problem, space, settings)
+            particles = settled_set(numbers, particles, problem, space, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
         free, extra = share_in(particles.extra), judged(particles.extra, eligible)
         survival = layer_survivals(settings, layer + 1)[-1]
@@ -115,12 +116,12 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
                 layer, weighted, annealed, survival, resampled=kept, diffused=kept, free=free
             )
             if guided:
-                extra = arrived(rng, particles.poses, extra, space)
+                extra = arrived(numbers.in_turn, particles.poses, extra, space)
             return ParticleSet(particles.poses, annealed.log_weights, raw, extra), record
-        survivors, first, second = _survivors(rng, weighted, space, settings)
+        survivors, first, second = _survivors(numbers, weighted, space, settings)
         of_survivors = moments(survivors)
         spread = _spread(survivors, of_survivors, layer, space, settings)
-        poses = settle(rng, spread, spread.draw(rng), survivors, problem, space, settings)
+        poses = settle(numbers, spread, spread.draw(numbers), survivors, problem, space, settings)
         record = layer_record(
             layer,
             weighted,
@@ -148,30 +149,27 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         return foreseen(particles, space)
 
 
-def _carried(rng: np.random.Generator, last: ParticleSet, settings: AnnealedSettings) -> Indices:
+def _carried(numbers: RandomNumbers, last: ParticleSet, settings: AnnealedSettings) -> Indices:
     """(N,) indices of the particles that start this frame: all (Eq. 9), survivors drawn by π, or the mode."""
-    weights = np.exp(last.log_weights)
-    drawn = draw(rng, weights, settings.particles, settings.resampling)
     if settings.carry == "weighted":
-        drawn = equal_draw(len(weights), settings.particles)
-    elif settings.carry == "mode":
-        drawn = np.full(settings.particles, np.argmax(weights))
-    return drawn
+        return equal_draw(len(last.poses), settings.particles)
+    if settings.carry == "mode":
+        return np.full(settings.particles, np.argmax(last.log_weights))
+    return draw(numbers, np.exp(last.log_weights), settings.particles, settings.resampling)
 
 
 def _survivors(
-    rng: np.random.Generator, weighted: ParticleSet, space: SearchSpace, settings: AnnealedSettings
+    numbers: RandomNumbers, weighted: ParticleSet, space: SearchSpace, settings: AnnealedSettings
 ) -> tuple[Array, Indices, Indices]:
     """(N, D) drawn by π with replacement, some of them children of two (step 4 as section 6.2.1 amends it); (N,) the
     first parent of each, and (N,) the second, -1 where there is none.
     """
     weights, count = np.exp(weighted.log_weights), len(weighted.poses)
-    parents = draw(rng, weights, count, settings.resampling)
-    first = weighted.poses[parents]
-    # A systematic draw is sorted; shuffling makes the two parents of a child independent.
-    others = rng.permutation(draw(rng, weights, count, settings.resampling))
-    second = weighted.poses[others]
-    children, crossed = cross(rng, first, second, space, share=settings.crossover, by=settings.crossover_by)
+    parents, others = draw(numbers, weights, count, settings.resampling), draw_others(numbers, weights, count)
+    first, second = weighted.poses[parents], weighted.poses[others]
+    children, crossed = cross(
+        numbers, first, second, space, share=settings.crossover, by=settings.crossover_by
+    )
     return children, parents, np.where(crossed, others, NO_PARENT)
 
 

@@ -27,6 +27,7 @@ from studio.search.trackers.model_free import judged
 from studio.search.trackers.one_layer_filter import OneLayerFilter
 from studio.search.trackers.paper_presets import CAILLETTE
 from studio.search.trackers.particles import first_set, uniform_poses, unweighted
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.resampling import draw
 from studio.search.trackers.settings import BehaviourSettings
 from studio.search.trackers.tracker import Arrays, FilterState, ParticleSet, SearchSpace
@@ -42,7 +43,7 @@ class BehaviourGuided(OneLayerFilter[BehaviourSettings]):
     presets = (CAILLETTE,)
 
     def begin_frame(
-        self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: BehaviourSettings
+        self, numbers: RandomNumbers, previous: FilterState, space: SearchSpace, settings: BehaviourSettings
     ) -> ParticleSet:
         """Survivors of the last frame, drawn by weight and moved by the model.
 
@@ -50,14 +51,14 @@ class BehaviourGuided(OneLayerFilter[BehaviourSettings]):
         """
         last, count = previous.particles, settings.particles
         if last is None:
-            anywhere = uniform_poses(rng, count, space)
+            anywhere = uniform_poses(numbers, count, space)
             if space.behaviour is None:
                 return unweighted(anywhere)
-            return spread_over_clusters(rng, space, count, anywhere, np.zeros_like(space.sigma))
-        drawn = draw(rng, np.exp(last.log_weights), count, settings.resampling)
+            return spread_over_clusters(numbers.in_turn, space, count, anywhere, np.zeros_like(space.sigma))
+        drawn = draw(numbers, np.exp(last.log_weights), count, settings.resampling)
         if space.behaviour is not None:
-            return guided_set(rng, previous, drawn, space, settings)
-        return first_set(rng, last.poses[drawn], space, settings)
+            return guided_set(numbers, previous, drawn, space, settings)
+        return first_set(numbers, last.poses[drawn], space, settings)
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: BehaviourSettings) -> Array:
         """(S, D) means of the clusters that hold enough particles, at their mean root (section 6.3)."""

@@ -18,6 +18,7 @@ from studio.search.trackers.annealing import Annealed, anneal, at_exponent
 from studio.search.trackers.layer_plan import LayerPlan
 from studio.search.trackers.one_layer_filter import OneLayerFilter
 from studio.search.trackers.particles import expected, first_set, uniform_poses, unweighted
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.resampling import draw
 from studio.search.trackers.settings import CondensationSettings
 from studio.search.trackers.tracker import Arrays, FilterState, LayerRecord, ParticleSet, SearchSpace
@@ -35,7 +36,7 @@ class Condensation(OneLayerFilter[CondensationSettings]):
 
     def begin_frame(
         self,
-        rng: np.random.Generator,
+        numbers: RandomNumbers,
         previous: FilterState,
         space: SearchSpace,
         settings: CondensationSettings,
@@ -43,10 +44,10 @@ class Condensation(OneLayerFilter[CondensationSettings]):
         """Survivors of the last frame, drawn by weight, moved and spread (section 2.1, steps 1 and 2)."""
         last = previous.particles
         if last is None:
-            return unweighted(uniform_poses(rng, settings.particles, space))
-        drawn = draw(rng, np.exp(last.log_weights), settings.particles, settings.resampling)
+            return unweighted(uniform_poses(numbers, settings.particles, space))
+        drawn = draw(numbers, np.exp(last.log_weights), settings.particles, settings.resampling)
         predicted = expected(last.poses[drawn], previous, settings.dynamics)
-        first = first_set(rng, predicted, space, settings)
+        first = first_set(numbers, predicted, space, settings)
         return ParticleSet(first.poses, first.log_weights, extra=last.extra | first.extra)
 
     def plan_layer(

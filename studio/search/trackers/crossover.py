@@ -10,22 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.foundations.arrays import Array, Mask
+from studio.search.trackers.counted_numbers import OF_CUTS, OF_PARENTS
 from studio.search.trackers.particle_kernels import children, places
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.tracker import SearchSpace
 
 
 def cross(
-    rng: np.random.Generator, first: Array, second: Array, space: SearchSpace, *, share: float, by: str
+    numbers: RandomNumbers, first: Array, second: Array, space: SearchSpace, *, share: float, by: str
 ) -> tuple[Array, Mask]:
     """(N, D) children, of which about `share` × N have two parents and the others equal `first`; (N,) which have two.
 
     first, second : (N, D) parents, drawn independently. by : "limbs" or "parameters".
-    Always uses 3 N random numbers, so that what is drawn afterwards does not depend on the share.
     """
     count = len(first)
     place: NDArray[np.int64] = limb_places(space) if by == "limbs" else np.arange(1, int(first.shape[1]) + 1)
-    chosen = rng.random(count) < share
-    return children(first, second, place, chosen, rng.random((count, 2)))
+    chosen = numbers.shares(count, 3, OF_PARENTS)[:, 2] < share
+    return children(first, second, place, chosen, numbers.shares(count, 2, OF_CUTS))
 
 
 def limb_places(space: SearchSpace) -> NDArray[np.int64]:

@@ -12,12 +12,19 @@ import math
 import numpy as np
 
 from studio.foundations.numba_on_devices import cuda
-from studio.search.trackers.counted_numbers import as_normals, as_share, random_words
+from studio.search.trackers.counted_numbers import (
+    OF_CUTS,
+    OF_NOISE,
+    OF_PARENTS,
+    OF_RUN,
+    as_normals,
+    as_share,
+    random_words,
+)
 from studio.search.trackers.layer_plan import WIDEST
+from studio.search.trackers.particle_kernels import SMALLEST
 
 SEED, FRAME, LAYER = 0, 1, 2
-OF_RUN, OF_PARENTS, OF_CUTS, OF_NOISE = 0, 1, 2, 16
-"""Which of a particle's words are meant; the run's own are those of particle 0."""
 BETA, SURVIVAL, MOST, TOTAL, BEST = range(5)
 ANNEALED = 5
 """Numbers of an annealed layer: β, the survival rate reached, the largest log-weight, the sum of what follows from the
@@ -35,7 +42,7 @@ NO_PARENT = -1
 SUMMING = 512
 """Threads that sum up a run's particles: a power of two."""
 NEWTON_STEPS, CLOSE = 60, 1e-7
-SMALLEST, FARTHEST = 1e-9, 40.0
+FARTHEST = 40.0
 BETA_LIMIT = 690.0
 
 

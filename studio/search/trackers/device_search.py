@@ -44,6 +44,7 @@ from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Mo
 from studio.search.trackers.layer_plan import LayerPlan, Noise
 from studio.search.trackers.particle_kernels import places
 from studio.search.trackers.particles import ParticleFilter
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.tracker import (
     Arrays,
     FilterState,
@@ -257,10 +258,8 @@ class DeviceSearch:
         self._set: DeviceSet | None = None
         self._extra: Arrays = {}
 
-    def begin(self, previous: FilterState, key: tuple[int, int, int], settings: Any) -> None:  # noqa: ANN401
-        """Make the first layer's set from what the last frame left. key : seed, frame, and a number below those of
-        layers, one for each search of the frame.
-        """
+    def begin(self, previous: FilterState, numbers: RandomNumbers, settings: Any) -> None:  # noqa: ANN401
+        """Make the first layer's set from what the last frame left."""
         last = previous.particles
         assert last is not None
         self._extra = last.extra
@@ -272,7 +271,7 @@ class DeviceSearch:
         )
         self._set = self._filter.begin(
             self._filter.take([last]),
-            [Moment(*key)],
+            [Moment(*numbers.key)],
             settings.particles,
             self._space.sigma * settings.diffusion_scale,
             getattr(settings, "carry", "resampled"),
@@ -284,13 +283,13 @@ class DeviceSearch:
         """Go on from a set of the host."""
         self._set, self._extra = self._filter.take([particles]), particles.extra
 
-    def step(self, layer: int, key: tuple[int, int, int], settings: Any) -> LayerRecord:  # noqa: ANN401
-        """Do a layer and return its record. key : seed, frame and layer."""
+    def step(self, layer: int, numbers: RandomNumbers, settings: Any) -> LayerRecord:  # noqa: ANN401
+        """Do a layer and return its record."""
         assert self._set is not None
         plan = self._tracker.plan_layer(layer, self._space, settings, self._extra)
         assert plan is not None
         weighed, self._set = self._filter.step(
-            self._set, self._problem, [Moment(*key)], [plan], settings.resampling == "systematic"
+            self._set, self._problem, [Moment(*numbers.key)], [plan], settings.resampling == "systematic"
         )
         self.evaluated = weighed.count
         record = self._filter.record(weighed, plan, layer)

@@ -53,6 +53,7 @@ from studio.search.trackers.particle_swarm import (
 )
 from studio.search.trackers.particles import unweighted
 from studio.search.trackers.partitions import moment_of, stages_of
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.swarm_settings import SwarmSettings
 from studio.search.trackers.tracker import FilterState, LayerRecord, ParticleSet, SearchSpace
 
@@ -299,23 +300,25 @@ class DeviceSearch:
         self._set: DeviceSwarmSet | None = None
         self._freedom = np.ones(len(space.names))
 
-    def begin(self, previous: FilterState, key: tuple[int, int, int], settings: SwarmSettings) -> None:
-        """Sample the first stage's swarm about x̂. key : seed, frame, and a number below those of layers, one for each
-        search of the frame.
-        """
+    def begin(self, previous: FilterState, numbers: RandomNumbers, settings: SwarmSettings) -> None:
+        """Sample the first stage's swarm about x̂."""
         first = stages_of(self._space.hierarchy, settings)[0]
         self._freedom = first.freedom
         start = expected_pose(previous, settings)
         self._set = self._swarm.sample(
-            start[None], [Moment(*key)], first.particles, [self._sampling(settings)], settings.constraints
+            start[None],
+            [Moment(*numbers.key)],
+            first.particles,
+            [self._sampling(settings)],
+            settings.constraints,
         )
 
     def take(self, particles: ParticleSet) -> None:
         """Go on from a swarm of the host."""
         self._set, self._freedom = self._swarm.take([particles]), particles.extra[FREEDOM]
 
-    def step(self, layer: int, key: tuple[int, int, int], settings: SwarmSettings) -> LayerRecord:
-        """Do an iteration and return its record. key : seed, frame and layer."""
+    def step(self, layer: int, numbers: RandomNumbers, settings: SwarmSettings) -> LayerRecord:
+        """Do an iteration and return its record."""
         assert self._set is not None
         stages = stages_of(self._space.hierarchy, settings)
         now = moment_of(stages, layer)
@@ -332,7 +335,7 @@ class DeviceSearch:
         weighed, self._set = self._swarm.step(
             self._set,
             self._problem,
-            [Moment(*key)],
+            [Moment(*numbers.key)],
             steps,
             constraints=settings.constraints,
             trunk_first=trunk_first,

@@ -12,13 +12,17 @@ import math
 import numpy as np
 
 from studio.foundations.numba_on_devices import cuda
-from studio.search.trackers.counted_numbers import as_normals, as_share, random_words
+from studio.search.trackers.counted_numbers import (
+    OF_TRIES,
+    OF_TRY,
+    OF_VELOCITIES,
+    as_normals,
+    as_share,
+    random_words,
+)
 from studio.search.trackers.device_kernels import BEST, FRAME, LAYER, MOST, SEED, SUMMING
 from studio.search.trackers.hard_priors import MOST_REDRAWS
 
-OF_VELOCITIES, OF_TRIES, OF_TRY = 1 << 10, 1 << 11, 1 << 8
-"""Which of a particle's words are meant, beyond those of filters: a sampled swarm's velocities; the first try of a
-step; how many a try has."""
 VALUE, POSSIBLE = 0, 1
 STANDING = 5
 """Numbers of a run; column 3 is not used, so that MOST and BEST are those of `device_kernels`."""

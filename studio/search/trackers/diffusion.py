@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.foundations.arrays import Array
-from studio.search.trackers.particle_kernels import Moments
+from studio.foundations.arrays import Array, Indices
+from studio.search.trackers.particle_kernels import Moments, root_of
+from studio.search.trackers.random_numbers import RandomNumbers, place_of_try
 
 
 def planned_sigma(sigma: Array, survivals: Sequence[float], decay: str) -> Array:
@@ -38,23 +39,28 @@ def planned_sigma(sigma: Array, survivals: Sequence[float], decay: str) -> Array
 class Spread:
     """Gaussian noise about N poses, which may be redrawn for some of them.
 
-    centres : (N, D). scale : a factor of all noise. deviation : (D,) standard deviations. turn : (D, D) correlates
-    independent normals (in its rows' space) before they are multiplied by `deviation`; None: they stay
+    centres : (N, D). scale : a factor of all noise. deviation : (D,) standard deviations. root : (D, D), lower, the
+    Cholesky root of the correlations, by which independent normals are multiplied before `deviation`; None: they stay
     independent.
     """
 
     centres: Array
     scale: float
     deviation: Array
-    turn: Array | None = None
+    root: Array | None = None
 
-    def draw(self, rng: np.random.Generator, rows: NDArray[np.int64] | None = None) -> Array:
-        """(K, D) poses about the centres of some rows, of all if None."""
-        centres = self.centres if rows is None else self.centres[rows]
-        normal = rng.standard_normal(centres.shape)
-        if self.turn is not None:
-            normal = normal @ self.turn
-        return centres + self.scale * (normal * self.deviation)
+    def draw(self, numbers: RandomNumbers) -> Array:
+        """(N, D) poses about all centres."""
+        return self._about(self.centres, numbers.normals(len(self.centres), len(self.deviation)))
+
+    def draw_again(self, numbers: RandomNumbers, rows: Indices, attempt: int) -> Array:
+        """(K, D) poses about the centres of some rows (K,), others with each attempt, from 1."""
+        place = place_of_try(attempt)
+        return self._about(self.centres[rows], numbers.normals(rows, len(self.deviation), place))
+
+    def _about(self, centres: Array, normals: NDArray[np.float32]) -> Array:
+        noise = normals if self.root is None else normals @ self.root.T
+        return centres + self.scale * (noise * self.deviation)
 
 
 def noise_about(poses: Array, sigma: Array) -> Spread:
@@ -78,12 +84,10 @@ def proportional_noise(poses: Array, own: Moments, constant: float, covariance: 
 
 
 def _sample_noise(poses: Array, own: Moments, covariance: str) -> tuple[Array, Array | None]:
-    """Deviation and turn of noise with the sample's variances, or its full covariance (Eq. 18's sum over N)."""
+    """Deviation and root of noise with the sample's variances, or its full covariance (Eq. 18's sum over N)."""
     deviation = np.sqrt(own.variance)
     if covariance == "diagonal":
         return deviation, None
-    # Scaled to unit variances first: millimetres beside radians would drown the small eigenvalues.
-    unit = np.where(deviation > 0.0, deviation, 1.0)
-    centred = (poses - own.mean) / unit
-    values, vectors = np.linalg.eigh(centred.T @ centred / len(poses))
-    return unit, np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    # Scaled to unit variances first: millimetres beside radians would drown the small pivots.
+    centred = (poses - own.mean) / np.where(deviation > 0.0, deviation, 1.0)
+    return deviation, root_of(centred.T @ centred / len(poses))

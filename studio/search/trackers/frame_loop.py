@@ -2,7 +2,7 @@
 
 A frame is searched `repeats` times over (more than once only where a run starts): each search begins with
 what the one before ended with. Layers are numbered through: layer i of search r is record r M + i. Random
-numbers are keyed by (seed, frame, that number), so a frame replays bit for bit from the same particles and
+numbers are counted from seed, frame and that number, so a frame replays bit for bit from the same particles and
 settings, wherever it was interrupted.
 """
 
@@ -20,6 +20,7 @@ from studio.foundations.knobs import knobs_of
 from studio.search.likelihood.problem import FittedToPoses, WeighedOnDevice
 from studio.search.trackers.layer_plan import WIDEST
 from studio.search.trackers.particles import WeightError
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.tracker import (
     HIDDEN,
     MOVED,
@@ -32,13 +33,7 @@ from studio.search.trackers.tracker import (
     ParticleSet,
     SearchOnDevice,
     SearchSpace,
-    generator,
-    keyed_generator,
 )
-
-BEGINNINGS = 1 << 31
-"""Numbers of layers from here on are those of the sets that a frame's searches begin with."""
-SEEDS = (1 << 64) - 1
 
 if TYPE_CHECKING:
     from studio.search.likelihood.device_weighing import ProblemOnDevice
@@ -194,9 +189,11 @@ class FrameSearch:
             expected = self._expected(particles, settings)
         assert particles is not None
         informed = problem if expected is None else self._with_expectations(problem, repeat, expected)
-        rng = generator(self.seed, self.frame, state.layers_done)
+        numbers = RandomNumbers(self.seed, self.frame, state.layers_done, repeat)
         try:
-            following, record = self.tracker.step_layer(rng, particles, layer, informed, self.space, settings)
+            following, record = self.tracker.step_layer(
+                numbers, particles, layer, informed, self.space, settings
+            )
         except WeightError as error:
             raise WeightError(
                 f"Frame {self.frame}, layer {state.layers_done + 1}: {error.message}", error.hint
@@ -230,7 +227,8 @@ class FrameSearch:
             on_device = self._on_device
             if on_device is None or layer == 0:
                 on_device = self._begun_on_device(there, repeat, layer, settings)
-            record = on_device.step(layer, self._key(state.layers_done), settings)
+            numbers = RandomNumbers(self.seed, self.frame, state.layers_done, repeat)
+            record = on_device.step(layer, numbers, settings)
             self._on_device = on_device
         except StudioError:
             raise
@@ -264,7 +262,7 @@ class FrameSearch:
         elif start.particles is None:
             on_device.take(self._beginning(repeat, settings))
         else:
-            on_device.begin(start, self._key(BEGINNINGS + repeat), settings)
+            on_device.begin(start, RandomNumbers.of_beginning(self.seed, self.frame, repeat), settings)
         return on_device
 
     def _fits_device(self, layer: int, settings: Any) -> bool:  # noqa: ANN401
@@ -273,15 +271,11 @@ class FrameSearch:
         fits = self.tracker.fits_device(layer, self.space, settings, extra)
         return fits and len(self.space.names) <= WIDEST
 
-    def _key(self, number: int) -> tuple[int, int, int]:
-        """What a card's random numbers are counted from."""
-        return self.seed & SEEDS, self.frame, number
-
     def _beginning(self, repeat: int, settings: Any) -> ParticleSet:  # noqa: ANN401
         """The unweighted set of a search's first layer."""
-        rng = beginning_generator(self.seed, self.frame, repeat)
+        numbers = RandomNumbers.of_beginning(self.seed, self.frame, repeat)
         start = self.previous if repeat == 0 else FilterState(self.state.particles)
-        return self.tracker.begin_frame(rng, start, self.space, settings)
+        return self.tracker.begin_frame(numbers, start, self.space, settings)
 
     def _expected(self, particles: ParticleSet, settings: Any) -> Array:  # noqa: ANN401
         """(S, D) poses expected by a search that starts from these particles: the tracker's; after
@@ -354,12 +348,3 @@ def held_over(settings: Any, held: Any) -> Any:  # noqa: ANN401
         return settings
     slow = [entry.name for entry in knobs_of(settings) if entry.takes_effect != "next layer"]
     return dataclasses.replace(settings, **{name: getattr(held, name) for name in slow})
-
-
-def beginning_generator(seed: int, frame: int, repeat: int) -> np.random.Generator:
-    """The random numbers of `begin_frame`: `generator(seed, frame, -1)` for the first search, others for
-    repeats.
-    """
-    if repeat == 0:
-        return generator(seed, frame, -1)
-    return keyed_generator(seed, frame, 0, repeat)

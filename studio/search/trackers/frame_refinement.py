@@ -23,6 +23,7 @@ from studio.foundations.knobs import next_frame_knob
 from studio.search.trackers.agreement import Agreement, Disagreement
 from studio.search.trackers.hidden_areas import learnt, without_hidden
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
+from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import Distances, RefinementSettings, Refiner
 from studio.search.trackers.tracker import (
     LIMB_LOST_SHARE,
@@ -30,7 +31,6 @@ from studio.search.trackers.tracker import (
     FrameLikelihood,
     FrameResult,
     SearchSpace,
-    keyed_generator,
 )
 
 POSE, CLOUD = "pose", "cloud"

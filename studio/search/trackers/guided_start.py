@@ -24,6 +24,7 @@ from studio.search.trackers.guided_particles import (
 from studio.search.trackers.hard_priors import Proposals, settled
 from studio.search.trackers.model_free import BEATEN, FREE, chosen_free, share_of
 from studio.search.trackers.particles import CAME_FROM, first_set, settled_first, unweighted
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.shared_knobs import GuidedSettings, SearchSettings
 from studio.search.trackers.tracker import Arrays, FilterState, FrameLikelihood, ParticleSet, SearchSpace
 
@@ -33,7 +34,7 @@ PAST = (CAME_FROM, CAME_FROM_STATES, CAME_FROM_VELOCITY)
 
 
 def guided_set(
-    rng: np.random.Generator, previous: FilterState, rows: Indices, space: SearchSpace, rules: GuidedSettings
+    numbers: RandomNumbers, previous: FilterState, rows: Indices, space: SearchSpace, rules: GuidedSettings
 ) -> ParticleSet:
     """The unweighted set of a frame that starts from the particles `rows` (N,) of the last one's.
 
@@ -41,9 +42,10 @@ def guided_set(
     """
     assert previous.particles is not None
     if previous.estimate is None:
-        first = first_set(rng, previous.particles.poses[rows], space, rules)
-        return replace(first, extra=first.extra | _found_near(rng, first.poses, space))
+        first = first_set(numbers, previous.particles.poses[rows], space, rules)
+        return replace(first, extra=first.extra | _found_near(numbers.in_turn, first.poses, space))
     share = share_of(rules.model_free_share, rules.model_free_grows, previous.particles.extra)
+    rng = numbers.in_turn
     free = chosen_free(rng, len(rows), share)
     past = walkers_from(rng, previous, rows, free, space)
     drawn = propagated(rng, past, space, rules, space.sigma * rules.diffusion_scale)
@@ -54,7 +56,7 @@ def guided_set(
 
 
 def settled_set(
-    rng: np.random.Generator,
+    numbers: RandomNumbers,
     particles: ParticleSet,
     problem: FrameLikelihood,
     space: SearchSpace,
@@ -68,14 +70,14 @@ def settled_set(
         return particles
     extra, sigma = particles.extra, space.sigma * rules.diffusion_scale
     if CAME_FROM_STATES not in extra or not isinstance(rules, GuidedSettings):
-        first = settled_first(rng, particles, problem, space, rules)
-        found = _found_near(rng, first.poses, space) if STATES in extra else {}
+        first = settled_first(numbers, particles, problem, space, rules)
+        found = _found_near(numbers.in_turn, first.poses, space) if STATES in extra else {}
         return replace(first, extra=first.extra | found)
     past = GuidedParticles(extra[CAME_FROM], extra[CAME_FROM_STATES], extra[CAME_FROM_VELOCITY], extra[FREE])
     first = GuidedParticles(particles.poses, extra[STATES], extra[VELOCITY], extra[FREE])
 
-    def again(rows: Indices) -> Proposals:
-        return _packed(propagated(rng, past.at(rows), space, rules, sigma))
+    def again(rows: Indices, _attempt: int) -> Proposals:
+        return _packed(propagated(numbers.in_turn, past.at(rows), space, rules, sigma))
 
     done = settled(problem, space, rules, _packed(first), past.poses, again)
     states = done.velocities[:, -1].astype(np.int64) - 1

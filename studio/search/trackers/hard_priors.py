@@ -46,12 +46,12 @@ def settled(
     rules: SearchSettings,
     proposed: Proposals,
     came_from: Array,
-    again: Callable[[Indices], Proposals],
+    again: Callable[[Indices, int], Proposals],
 ) -> Proposals:
     """The proposals after the rules were applied; those to be rejected are still among them (see `possible`).
 
     came_from : (N, D) where each particle started. again : new proposals for some rows, from the same starting
-    points with new random numbers.
+    points with the random numbers of an attempt, from 1.
     """
     if rules.constraints == "clamp":
         return clamped(space, proposed)
@@ -80,15 +80,15 @@ def _redrawn(
     limbs_apart: bool,
     proposed: Proposals,
     came_from: Array,
-    again: Callable[[Indices], Proposals],
+    again: Callable[[Indices, int], Proposals],
 ) -> Proposals:
     """Impossible proposals drawn again at most `MOST_REDRAWS` times, then left where they came from."""
     wrong = np.flatnonzero(~problem.feasible(proposed.poses, limbs_apart))
     if not wrong.size:
         return proposed
     poses, velocities = proposed.poses.copy(), proposed.velocities.copy()
-    for _ in range(MOST_REDRAWS):
-        drawn = again(wrong)
+    for attempt in range(1, MOST_REDRAWS + 1):
+        drawn = again(wrong, attempt)
         good = problem.feasible(drawn.poses, limbs_apart)
         poses[wrong[good]], velocities[wrong[good]] = drawn.poses[good], drawn.velocities[good]
         wrong = wrong[~good]

@@ -2,14 +2,13 @@
 
 from abc import abstractmethod
 
-import numpy as np
-
 from studio.foundations.arrays import Array
 from studio.search.trackers.annealing import Annealed
 from studio.search.trackers.guided_start import settled_set
 from studio.search.trackers.layer_record import layer_record
 from studio.search.trackers.model_free import share_in
 from studio.search.trackers.particles import ParticleFilter, Searching, weigh, weighted_variance
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.tracker import Arrays, FrameLikelihood, LayerRecord, ParticleSet, SearchSpace
 
 
@@ -21,14 +20,14 @@ class OneLayerFilter(ParticleFilter[Searching]):
 
     def step_layer(
         self,
-        rng: np.random.Generator,
+        numbers: RandomNumbers,
         particles: ParticleSet,
         layer: int,
         problem: FrameLikelihood,
         space: SearchSpace,
         settings: Searching,
     ) -> tuple[ParticleSet, LayerRecord]:
-        particles = settled_set(rng, particles, problem, space, settings)
+        particles = settled_set(numbers, particles, problem, space, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
         chosen, wanted, extra = self.selected(eligible, particles.extra, settings)
         weighted = ParticleSet(particles.poses, chosen.log_weights, raw, extra)

@@ -35,7 +35,8 @@ from studio.search.behaviour.root_motion import RootMotion, gaussians_of
 from studio.search.trackers.guided_particles import STATES
 from studio.search.trackers.guided_start import CAME_FROM_STATES
 from studio.search.trackers.guided_swarm import BEFORE_STATE, LEADER_STATE
-from studio.search.trackers.tracker import FilterState, keyed_generator
+from studio.search.trackers.random_numbers import keyed_generator
+from studio.search.trackers.tracker import FilterState
 
 # By K: poses (K, D), log-weights (K,) and overlaps with the masks (K,), NaN where unknown, of a run's first K frames.
 Tracked = Callable[[int], tuple[Array, Array, Array]]

@@ -10,6 +10,9 @@ import numpy as np
 from studio.foundations.arrays import Array, Indices, Mask
 from studio.foundations.numba_in_threads import EXACT, njit
 
+SMALLEST = 1e-9
+"""Pivots of correlations below this are those of a direction that is a sum of others, or does not vary."""
+
 
 class Moments(NamedTuple):
     """Mean and variance (D,) of the poses of a set, all weighing the same."""
@@ -93,3 +96,25 @@ def places(limb: Indices) -> Indices:
     for d in range(1, len(limb)):
         found[d] = found[d - 1] + (limb[d] != limb[d - 1])
     return found
+
+
+@njit(**EXACT)
+def root_of(correlations: Array) -> Array:
+    """(D, D) lower Cholesky root of correlations (D, D); a direction that is a sum of others, or does not vary, has no
+    noise of its own.
+    """
+    size = len(correlations)
+    root = np.zeros((size, size))
+    for j in range(size):
+        left = correlations[j, j]
+        for k in range(j):
+            left -= root[j, k] * root[j, k]
+        if left <= SMALLEST:
+            continue
+        root[j, j] = np.sqrt(left)
+        for i in range(j + 1, size):
+            value = correlations[i, j]
+            for k in range(j):
+                value -= root[i, k] * root[j, k]
+            root[i, j] = value / root[j, j]
+    return root

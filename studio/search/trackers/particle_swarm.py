@@ -25,16 +25,19 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, Indices
 from studio.search.likelihood.problem import WHOLE_BODY
+from studio.search.trackers.counted_numbers import OF_VELOCITIES
 from studio.search.trackers.guided_particles import foreseen, is_guided
 from studio.search.trackers.guided_swarm import BEFORE, handed_on, leader_arrived, predicted_starts
-from studio.search.trackers.hard_priors import Indices, Mask, Proposals, possible, settled
+from studio.search.trackers.hard_priors import Mask, Proposals, possible, settled
 from studio.search.trackers.model_free import FREE, judged, share_in
 from studio.search.trackers.particle_kernels import moments
 from studio.search.trackers.particles import checked_values, expected, uniform_poses, unweighted
 from studio.search.trackers.partitions import Stage, evaluations, layer_count, moment_of, stages_of
+from studio.search.trackers.random_numbers import RandomNumbers, place_of_try
 from studio.search.trackers.swarm_settings import PRESETS, VARIANTS, SwarmSettings
 from studio.search.trackers.tracker import (
     Arrays,
@@ -105,7 +108,7 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         return SMALLEST_SWARM * (STAGE1_ITERATIONS + STAGE2_ITERATIONS)
 
     def begin_frame(
-        self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: SwarmSettings
+        self, numbers: RandomNumbers, previous: FilterState, space: SearchSpace, settings: SwarmSettings
     ) -> ParticleSet:
         """The first stage's swarm, sampled about x̂: x ← N(x̂, Σ), v ← U(-σ, σ)."""
         first = stages_of(space.hierarchy, settings)[0]
@@ -113,20 +116,22 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         if last is None:
             freedom = np.ones(len(space.names))
             sigma = space.sigma * settings.diffusion_scale
-            spread = uniform_poses(rng, first.particles, space)
-            drawn = Proposals(spread, _start_velocities(rng, spread.shape, sigma, settings))
+            spread = uniform_poses(numbers, first.particles, space)
+            drawn = Proposals(spread, _start_velocities(numbers, len(spread), sigma, settings))
             return _new_swarm(drawn, spread.mean(axis=0), freedom)
         sigma = space.sigma * settings.diffusion_scale * first.freedom
         starts, arrays = expected_pose(previous, settings), {}
         if is_guided(space, settings.prediction) and previous.estimate is not None:
             pose = previous.estimate
-            starts, arrays = predicted_starts(rng, previous, pose, first.particles, space, settings)
-        drawn = _sampled(rng, starts, sigma, first.particles, settings)
+            starts, arrays = predicted_starts(
+                numbers.in_turn, previous, pose, first.particles, space, settings
+            )
+        drawn = _sampled(numbers, starts, sigma, first.particles, settings)
         return _new_swarm(drawn, starts, first.freedom, arrays)
 
     def step_layer(
         self,
-        rng: np.random.Generator,
+        numbers: RandomNumbers,
         particles: ParticleSet,
         layer: int,
         problem: FrameLikelihood,
@@ -138,7 +143,7 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         now = moment_of(stages, layer)
         stage = stages[now.number]
         if layer == 0:
-            particles = _kept_possible(rng, particles, problem, space, settings)
+            particles = _kept_possible(numbers.beginning, particles, problem, space, settings)
         seen = seen_in(stage, particles.extra[FREEDOM])
         values = checked_values(problem.fitness(particles.poses, seen), len(particles.poses))
         allowed = possible(problem, particles.poses, settings)
@@ -149,14 +154,14 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         weighed = ParticleSet(particles.poses, particles.log_weights, values, extra)
         if now.iteration < stage.iterations:
             c = acceleration(now.iteration + 1, stage.iterations, settings.c_first, settings.c_last)
-            following = _moved(rng, weighed, c, problem, space, settings)
+            following = _moved(numbers, weighed, c, problem, space, settings)
         elif now.number + 1 < len(stages):
-            following = _next_swarm(rng, extra, stages[now.number + 1], problem, space, settings)
+            following = _next_swarm(numbers, extra, stages[now.number + 1], problem, space, settings)
         else:
             following = weighed
         record = _record(layer, weighed, allowed, following, free)
         if following is weighed and is_guided(space, settings.prediction):
-            following = replace(weighed, extra=leader_arrived(rng, extra[LEADER], extra, space))
+            following = replace(weighed, extra=leader_arrived(numbers.in_turn, extra[LEADER], extra, space))
         return following, record
 
     def fits_device(self, layer: int, space: SearchSpace, settings: SwarmSettings, extra: Arrays) -> bool:
@@ -207,7 +212,7 @@ def constriction(c: float) -> float:
 
 
 def _moved(
-    rng: np.random.Generator,
+    numbers: RandomNumbers,
     swarm: ParticleSet,
     c: float,
     problem: FrameLikelihood,
@@ -220,19 +225,21 @@ def _moved(
     shrink = constriction(c)
     to_own, to_leader = extra[BEST_POSES] - places, extra[LEADER] - places
 
-    def proposed(rows: Indices | slice) -> Proposals:
+    def proposed(rows: Indices, attempt: int) -> Proposals:
         own, leader = to_own[rows], to_leader[rows]
-        luck = rng.random((2, *own.shape))
-        velocities = shrink * (extra[VELOCITIES][rows] + c * luck[0] * own + c * luck[1] * leader)
+        # Two parameters a counter.
+        shares = numbers.shares(rows, 2 * own.shape[1], place_of_try(attempt), step=2)
+        luck = shares.reshape(*own.shape, 2)
+        velocities = shrink * (extra[VELOCITIES][rows] + c * luck[..., 0] * own + c * luck[..., 1] * leader)
         velocities = np.minimum(np.maximum(velocities, -limit), limit)
         return Proposals(places[rows] + velocities, velocities)
 
-    done = settled(problem, space, settings, proposed(slice(None)), places, proposed)
+    done = settled(problem, space, settings, proposed(np.arange(len(places)), 0), places, proposed)
     return ParticleSet(done.poses, swarm.log_weights, extra=extra | {VELOCITIES: done.velocities})
 
 
 def _next_swarm(
-    rng: np.random.Generator,
+    numbers: RandomNumbers,
     extra: Arrays,
     stage: Stage,
     problem: FrameLikelihood,
@@ -241,13 +248,13 @@ def _next_swarm(
 ) -> ParticleSet:
     """A stage's swarm, sampled about the best pose of the stage before."""
     start, sigma = extra[LEADER], space.sigma * settings.diffusion_scale * stage.freedom
-    drawn = _sampled(rng, start, sigma, stage.particles, settings)
+    drawn = _sampled(numbers, start, sigma, stage.particles, settings)
     sampled = _new_swarm(drawn, start, stage.freedom, handed_on(extra))
-    return _kept_possible(rng, sampled, problem, space, settings)
+    return _kept_possible(numbers, sampled, problem, space, settings)
 
 
 def _kept_possible(
-    rng: np.random.Generator,
+    numbers: RandomNumbers,
     swarm: ParticleSet,
     problem: FrameLikelihood,
     space: SearchSpace,
@@ -258,9 +265,10 @@ def _kept_possible(
     velocities = swarm.extra[VELOCITIES]
     sigma = space.sigma * settings.diffusion_scale * swarm.extra[FREEDOM]
 
-    def again(rows: Indices) -> Proposals:
-        normal = rng.standard_normal((len(rows), starts.shape[1]))
-        return Proposals(starts[rows] + normal * sigma, velocities[rows])
+    def again(rows: Indices, attempt: int) -> Proposals:
+        return Proposals(
+            starts[rows] + _normals(numbers, rows, len(sigma), attempt) * sigma, velocities[rows]
+        )
 
     drawn = Proposals(swarm.poses, velocities)
     # An impossible prediction is replaced by where the swarm was before.
@@ -272,18 +280,24 @@ def _kept_possible(
 
 
 def _sampled(
-    rng: np.random.Generator, start: Array, sigma: Array, count: int, settings: SwarmSettings
+    numbers: RandomNumbers, start: Array, sigma: Array, count: int, settings: SwarmSettings
 ) -> Proposals:
     """x ← N(x̂, Σ), v ← U(-σ, σ). start : (D,) or (count, D), x̂."""
-    poses = start + rng.standard_normal((count, start.shape[-1])) * sigma
-    return Proposals(poses, _start_velocities(rng, poses.shape, sigma, settings))
+    poses = start + _normals(numbers, np.arange(count), len(sigma), 0) * sigma
+    return Proposals(poses, _start_velocities(numbers, count, sigma, settings))
 
 
-def _start_velocities(
-    rng: np.random.Generator, shape: tuple[int, ...], sigma: Array, settings: SwarmSettings
-) -> Array:
-    uniform = (2.0 * rng.random(shape) - 1.0) * sigma
-    return uniform if settings.start_velocity == "uniform" else np.zeros(shape)
+def _normals(numbers: RandomNumbers, rows: Indices, size: int, attempt: int) -> NDArray[np.float32]:
+    """(K, size) normal numbers of an attempt to sample some particles (K,), two a counter."""
+    counters = -(-size // 2)
+    normals = numbers.normals(rows, 4 * counters, place_of_try(attempt), step=2)
+    return normals.reshape(len(rows), counters, 4)[:, :, :2].reshape(len(rows), -1)[:, :size]
+
+
+def _start_velocities(numbers: RandomNumbers, count: int, sigma: Array, settings: SwarmSettings) -> Array:
+    if settings.start_velocity != "uniform":
+        return np.zeros((count, len(sigma)))
+    return (2.0 * numbers.shares(count, len(sigma), OF_VELOCITIES) - 1.0) * sigma
 
 
 def _new_swarm(drawn: Proposals, start: Array, freedom: Array, more: Arrays | None = None) -> ParticleSet:

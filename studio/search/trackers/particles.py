@@ -9,6 +9,7 @@ from studio.foundations.errors import RunError
 from studio.search.trackers.diffusion import Spread, noise_about
 from studio.search.trackers.hard_priors import Proposals, possible, settled
 from studio.search.trackers.layer_plan import LayerPlan
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.shared_knobs import SearchSettings
 from studio.search.trackers.tracker import (
     Arrays,
@@ -34,7 +35,7 @@ def unweighted(poses: Array, extra: Arrays | None = None) -> ParticleSet:
     return ParticleSet(poses, np.full(len(poses), -np.log(len(poses))), extra=extra or {})
 
 
-def uniform_poses(rng: np.random.Generator, count: int, space: SearchSpace) -> Array:
+def uniform_poses(numbers: RandomNumbers, count: int, space: SearchSpace) -> Array:
     """(count, D) poses spread evenly between the limits; raises RunError where a parameter has none."""
     bounded = np.isfinite(space.lower) & np.isfinite(space.upper)
     if not bounded.all():
@@ -43,7 +44,7 @@ def uniform_poses(rng: np.random.Generator, count: int, space: SearchSpace) -> A
             f"A search without a start pose samples between the limits, but '{name}' has none.",
             "Give a start pose, or give every parameter of the body finite limits.",
         )
-    return space.lower + rng.random((count, len(space.names))) * (space.upper - space.lower)
+    return space.lower + numbers.shares(count, len(space.names)) * (space.upper - space.lower)
 
 
 def expected(poses: Array, previous: FilterState, dynamics: str) -> Array:
@@ -83,14 +84,14 @@ def checked_values(values: Array, count: int) -> Array:
 
 
 def first_set(
-    rng: np.random.Generator, predicted: Array, space: SearchSpace, rules: SearchSettings
+    numbers: RandomNumbers, predicted: Array, space: SearchSpace, rules: SearchSettings
 ) -> ParticleSet:
     """The unweighted set that a filter's frame begins with: predicted poses (N, D) plus B_0 (Eq. 9, 10).
 
     Whether limbs are apart is known only with the frame's problem: with "redraw" the poses that the particles
     came from are kept in the set, for `settled_first`.
     """
-    drawn = noise_about(predicted, space.sigma * rules.diffusion_scale).draw(rng)
+    drawn = noise_about(predicted, space.sigma * rules.diffusion_scale).draw(numbers)
     if rules.constraints == "clamp":
         drawn = np.clip(drawn, space.lower, space.upper)
     came_from = {CAME_FROM: predicted} if rules.constraints == "redraw" else {}
@@ -98,23 +99,26 @@ def first_set(
 
 
 def settled_first(
-    rng: np.random.Generator,
+    numbers: RandomNumbers,
     particles: ParticleSet,
     problem: FrameLikelihood,
     space: SearchSpace,
     rules: SearchSettings,
 ) -> ParticleSet:
-    """A frame's first set with its impossible particles redrawn; unchanged where it does not keep their origins."""
+    """A frame's first set with its impossible particles redrawn; unchanged where it does not keep their origins.
+
+    numbers : of the first layer.
+    """
     if CAME_FROM not in particles.extra:
         return particles
     extra = {name: value for name, value in particles.extra.items() if name != CAME_FROM}
     spread = noise_about(particles.extra[CAME_FROM], space.sigma * rules.diffusion_scale)
-    first = settle(rng, spread, particles.poses, spread.centres, problem, space, rules)
+    first = settle(numbers.beginning, spread, particles.poses, spread.centres, problem, space, rules)
     return ParticleSet(first, particles.log_weights, particles.raw_log_weights, extra)
 
 
 def settle(
-    rng: np.random.Generator,
+    numbers: RandomNumbers,
     spread: Spread,
     drawn: Array,
     came_from: Array,
@@ -129,7 +133,7 @@ def settle(
         rules,
         Proposals.at(drawn),
         came_from,
-        lambda rows: Proposals.at(spread.draw(rng, rows)),
+        lambda rows, attempt: Proposals.at(spread.draw_again(numbers, rows, attempt)),
     )
     return done.poses
 

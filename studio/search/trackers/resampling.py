@@ -9,17 +9,21 @@ and needs no sorting. It is the default: on the test problems it leaves more dis
 import numpy as np
 
 from studio.foundations.arrays import Array, Indices
+from studio.search.trackers.counted_numbers import OF_PARENTS
 from studio.search.trackers.particle_kernels import drawn
+from studio.search.trackers.random_numbers import RandomNumbers
 
 
-def draw(rng: np.random.Generator, weights: Array, count: int, scheme: str) -> Indices:
-    """(count,) indices into `weights` (N,), which are normalised; scheme "systematic" or "multinomial".
+def draw(numbers: RandomNumbers, weights: Array, count: int, scheme: str) -> Indices:
+    """(count,) indices into `weights` (N,), which are normalised; scheme "systematic" or "multinomial"."""
+    if scheme == "systematic":
+        return drawn(weights, (np.arange(count) + numbers.share_of_all()) / count)
+    return drawn(weights, numbers.shares(count, 1, OF_PARENTS)[:, 0])
 
-    Always uses `count` + 1 random numbers, so that what is drawn afterwards does not depend on the scheme.
-    """
-    offset = rng.random()
-    singles = rng.random(count)
-    return drawn(weights, (np.arange(count) + offset) / count if scheme == "systematic" else singles)
+
+def draw_others(numbers: RandomNumbers, weights: Array, count: int) -> Indices:
+    """(count,) indices into `weights` (N,), one by one, independent of those of `draw`: second parents."""
+    return drawn(weights, numbers.shares(count, 2, OF_PARENTS)[:, 1])
 
 
 def equal_draw(population: int, count: int) -> Indices:

@@ -18,6 +18,7 @@ from studio.foundations.arrays import Array, Indices
 from studio.foundations.knobs import Value
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.likelihood.problem import FrameLikelihood
+from studio.search.trackers.random_numbers import RandomNumbers
 
 Arrays = dict[str, NDArray[Any]]
 """What a tracker keeps of each particle, by name."""
@@ -274,18 +275,16 @@ class SearchOnDevice(Protocol):
 
     evaluated: int
 
-    def begin(self, previous: FilterState, key: tuple[int, int, int], settings: Any) -> None:  # noqa: ANN401
-        """Make the first layer's set from what the last frame left. key : seed, frame, and a number below those of
-        layers, one for each search of the frame.
-        """
+    def begin(self, previous: FilterState, numbers: RandomNumbers, settings: Any) -> None:  # noqa: ANN401
+        """Make the first layer's set from what the last frame left."""
         ...
 
     def take(self, particles: ParticleSet) -> None:
         """Go on from a set of the host."""
         ...
 
-    def step(self, layer: int, key: tuple[int, int, int], settings: Any) -> LayerRecord:  # noqa: ANN401
-        """Do a layer and return its record. key : seed, frame and layer."""
+    def step(self, layer: int, numbers: RandomNumbers, settings: Any) -> LayerRecord:  # noqa: ANN401
+        """Do a layer and return its record."""
         ...
 
     def particles(self) -> ParticleSet:
@@ -353,11 +352,11 @@ class Tracker(ABC, Generic[S]):
 
     @abstractmethod
     def begin_frame(
-        self, rng: np.random.Generator, previous: FilterState, space: SearchSpace, settings: S
+        self, numbers: RandomNumbers, previous: FilterState, space: SearchSpace, settings: S
     ) -> ParticleSet:
         """The unweighted set that the first layer weighs: predicted (Eq. 10) and spread (Eq. 9).
 
-        rng : the only source of random numbers.
+        numbers : the only source of random numbers.
         previous : what the frame before left; its `particles` are None at a run's start without a pose.
         space : limits, σ0 and structure of the pose vector (mm, radians).
         settings : of the frame.
@@ -366,7 +365,7 @@ class Tracker(ABC, Generic[S]):
     @abstractmethod
     def step_layer(
         self,
-        rng: np.random.Generator,
+        numbers: RandomNumbers,
         particles: ParticleSet,
         layer: int,
         problem: FrameLikelihood,
@@ -375,7 +374,7 @@ class Tracker(ABC, Generic[S]):
     ) -> tuple[ParticleSet, LayerRecord]:
         """Weigh a set and make the next one: the new set, and the record of the layer.
 
-        rng : the only source of random numbers.
+        numbers : the only source of random numbers.
         particles : as the layer before left them; N may change from layer to layer.
         layer : from 0 in the order they run. In the last one the weighted set itself is returned.
         problem : log-weights of poses (N, D).
@@ -404,15 +403,3 @@ class Tracker(ABC, Generic[S]):
 
 AnyTracker = Tracker[Any]
 """A tracker of whatever settings, as the catalogue has it."""
-
-
-def generator(seed: int, frame: int, layer: int) -> np.random.Generator:
-    """The random numbers of one layer (layer -1: of `begin_frame`), keyed so that any frame replays bit for
-    bit.
-    """
-    return keyed_generator(seed, frame, layer + 1)
-
-
-def keyed_generator(*key: int) -> np.random.Generator:
-    """Random numbers that are a function of these whole numbers, none below 0."""
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(key)))

@@ -18,5 +18,5 @@ def test_every_public_name_stands_there_with_what_it_says_of_itself() -> None:
 def test_fields_and_calls_are_listed_with_their_meaning() -> None:
     content = interfaces_page()["content"]
     assert "<dt><code>log_weights</code></dt><dd>(N,) natural logs of normalised weights" in content
-    assert "<h3><code>step_layer(rng, particles, layer, problem, space, settings)</code></h3>" in content
+    assert "<h3><code>step_layer(numbers, particles, layer, problem, space, settings)</code></h3>" in content
     assert '<h2 id="TRUNK_FIRST"><code>TRUNK_FIRST</code></h2>\n<p><code>1</code></p>' in content

@@ -94,8 +94,25 @@ def searches(found):
         "search.variances": np.stack([record.variance_diffused for record in records]),
         "search.weighed": np.stack([record.variance_weighed for record in records]),
     }
+    records, previous = [], start
+    for frame in range(2):
+        previous = search_frame(
+            tracker,
+            problem,
+            previous,
+            space,
+            seed=5,
+            frame=frame,
+            settings_source=lambda: (0, SETTINGS),
+            repeats=2 - frame,
+            on_layer=records.append,
+        ).carried
+    found |= {
+        "frames.poses": np.stack([record.poses for record in records]),
+        "frames.parents": np.stack([record.parents for record in records if record.parents.size]),
+    }
     condensation, settings = Condensation(), CondensationSettings(particles=COUNT, scale_frames=1)
-    betas, scales = [], []
+    records, scales = [], []
     for frame in range(2):
         done = search_frame(
             condensation,
@@ -105,11 +122,15 @@ def searches(found):
             seed=5,
             frame=frame,
             settings_source=lambda: (0, settings),
-            on_layer=lambda record: betas.append(record.beta),
+            on_layer=records.append,
         )
         start = done.carried
         scales.append(start.particles.extra["log_scales"])
-    found |= {"condensation.betas": np.array(betas), "condensation.scales": np.concatenate(scales)}
+    found |= {
+        "condensation.poses": np.stack([record.poses for record in records]),
+        "condensation.betas": np.array([record.beta for record in records]),
+        "condensation.scales": np.concatenate(scales),
+    }
 
 
 if __name__ == "__main__":

@@ -9,8 +9,9 @@ from toy_problems import Bowl, HalfBowl, toy_space
 
 from studio.foundations.errors import RunError
 from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilter
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.settings import AnnealedSettings
-from studio.search.trackers.tracker import FilterState, ParticleSet, SearchSpace, generator
+from studio.search.trackers.tracker import FilterState, ParticleSet, SearchSpace
 
 FILTER = AnnealedParticleFilter()
 SPACE = toy_space(6)
@@ -30,7 +31,7 @@ def carried_set(count: int = 40) -> ParticleSet:
 def begun(space: SearchSpace, previous: FilterState, **changes: object) -> np.ndarray:
     """The poses with which a frame begins."""
     settings = AnnealedSettings(**({"particles": 40} | changes))  # pyright: ignore[reportArgumentType]
-    return FILTER.begin_frame(generator(1, 1, -1), previous, space, settings).poses
+    return FILTER.begin_frame(RandomNumbers.of_beginning(1, 1), previous, space, settings).poses
 
 
 def test_equation_9_carries_every_particle_once() -> None:
@@ -84,10 +85,10 @@ def test_variance_falls_as_for_a_gaussian(alpha: float) -> None:
     settings = AnnealedSettings(layers=5, particles=40000, survival=alpha, crossover=0.0)
     b = (1 - alpha**2 + np.sqrt(1 - alpha**2)) / alpha**2
     previous = FilterState(ParticleSet(np.zeros((1, 1)), np.zeros(1)))
-    particles = FILTER.begin_frame(generator(0, 0, -1), previous, space, settings)
+    particles = FILTER.begin_frame(RandomNumbers.of_beginning(0, 0), previous, space, settings)
     for layer in range(5):
         particles, record = FILTER.step_layer(
-            generator(0, 0, layer), particles, layer, Bowl(np.zeros(1)), space, settings
+            RandomNumbers(0, 0, layer), particles, layer, Bowl(np.zeros(1)), space, settings
         )
         narrowed = (1 + b) ** -(layer + 1)
         assert record.variance_resampled[0] == pytest.approx(narrowed, rel=0.1)
@@ -100,18 +101,20 @@ def test_plain_filter_adds_the_noise_of_equation_13() -> None:
     particles = ParticleSet(np.zeros((20000, 6)), np.full(20000, -np.log(20000)))
     for layer in range(3):
         _, record = FILTER.step_layer(
-            generator(0, 0, layer), particles, layer, Bowl(np.zeros(6)), SPACE, settings
+            RandomNumbers(0, 0, layer), particles, layer, Bowl(np.zeros(6)), SPACE, settings
         )
         assert np.allclose(record.variance_diffused, 0.09 * 0.4 ** (layer + 1), rtol=0.06)
 
 
 def test_rates_of_each_layer_are_met() -> None:
     settings = AnnealedSettings(layers=4, survival_per_layer="0.7, 0.5, 0.3")
-    particles = FILTER.begin_frame(generator(0, 0, -1), FilterState(carried_set()), SPACE, settings)
+    particles = FILTER.begin_frame(
+        RandomNumbers.of_beginning(0, 0), FilterState(carried_set()), SPACE, settings
+    )
     reached = []
     for layer in range(4):
         particles, record = FILTER.step_layer(
-            generator(0, 0, layer), particles, layer, Bowl(np.ones(6)), SPACE, settings
+            RandomNumbers(0, 0, layer), particles, layer, Bowl(np.ones(6)), SPACE, settings
         )
         reached.append((record.alpha_wanted, record.alpha_reached))
     assert [wanted for wanted, _ in reached] == [0.7, 0.5, 0.3, 0.3]
@@ -120,9 +123,11 @@ def test_rates_of_each_layer_are_met() -> None:
 
 def test_last_layer_returns_the_weighted_set_and_estimates() -> None:
     settings = AnnealedSettings(layers=1, particles=300, survival=0.3)
-    particles = FILTER.begin_frame(generator(4, 0, -1), FilterState(carried_set()), SPACE, settings)
+    particles = FILTER.begin_frame(
+        RandomNumbers.of_beginning(4, 0), FilterState(carried_set()), SPACE, settings
+    )
     problem = Bowl(np.full(6, 0.5))
-    weighted, record = FILTER.step_layer(generator(4, 0, 0), particles, 0, problem, SPACE, settings)
+    weighted, record = FILTER.step_layer(RandomNumbers(4, 0, 0), particles, 0, problem, SPACE, settings)
     assert np.array_equal(weighted.poses, particles.poses)
     assert np.array_equal(weighted.raw_log_weights, problem.log_likelihood(particles.poses))
     by_hand = np.exp(record.beta * weighted.raw_log_weights)
@@ -142,13 +147,15 @@ def test_last_layer_returns_the_weighted_set_and_estimates() -> None:
 
 def test_impossible_poses_do_not_survive() -> None:
     settings = AnnealedSettings(layers=6, particles=400)
-    particles = FILTER.begin_frame(generator(0, 0, -1), FilterState(carried_set()), SPACE, settings)
+    particles = FILTER.begin_frame(
+        RandomNumbers.of_beginning(0, 0), FilterState(carried_set()), SPACE, settings
+    )
     problem = HalfBowl(np.ones(6))
     poses = particles.poses
     for layer in range(6):
         poses = particles.poses
         particles, record = FILTER.step_layer(
-            generator(0, 0, layer), particles, layer, problem, SPACE, settings
+            RandomNumbers(0, 0, layer), particles, layer, problem, SPACE, settings
         )
         assert record.best[0] <= 0.0
     assert np.exp(particles.log_weights[poses[:, 0] > 0.0]).sum() == 0.0
@@ -161,18 +168,22 @@ def test_a_weight_that_is_not_finite_is_an_error() -> None:
             return np.full(len(poses), np.nan)
 
     settings = AnnealedSettings()
-    particles = FILTER.begin_frame(generator(0, 0, -1), FilterState(carried_set()), SPACE, settings)
+    particles = FILTER.begin_frame(
+        RandomNumbers.of_beginning(0, 0), FilterState(carried_set()), SPACE, settings
+    )
     with pytest.raises(RunError, match="nan"):
-        FILTER.step_layer(generator(0, 0, 0), particles, 0, Broken(np.zeros(6)), SPACE, settings)
+        FILTER.step_layer(RandomNumbers(0, 0, 0), particles, 0, Broken(np.zeros(6)), SPACE, settings)
 
 
 def test_one_particle_goes_through_all_layers() -> None:
     settings = AnnealedSettings(particles=1, layers=3)
-    particles = FILTER.begin_frame(generator(0, 0, -1), FilterState(carried_set()), SPACE, settings)
+    particles = FILTER.begin_frame(
+        RandomNumbers.of_beginning(0, 0), FilterState(carried_set()), SPACE, settings
+    )
     start = particles.poses.copy()
     for layer in range(3):
         particles, record = FILTER.step_layer(
-            generator(0, 0, layer), particles, layer, Bowl(np.zeros(6)), SPACE, settings
+            RandomNumbers(0, 0, layer), particles, layer, Bowl(np.zeros(6)), SPACE, settings
         )
         assert record.alpha_reached == 1.0
     assert np.allclose(particles.poses, start)

@@ -5,6 +5,7 @@ import pytest
 from toy_problems import toy_hierarchy
 
 from studio.search.trackers.crossover import cross, limb_places
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.tracker import SearchSpace
 
 
@@ -21,7 +22,7 @@ def children(share: float, by: str, limbs: list[int], count: int = 20000, seed: 
     space = space_of(limbs)
     shape = (count, len(limbs))
     made, crossed = cross(
-        np.random.default_rng(seed), np.zeros(shape), np.ones(shape), space, share=share, by=by
+        RandomNumbers(seed, 0, 0), np.zeros(shape), np.ones(shape), space, share=share, by=by
     )
     assert np.array_equal(crossed, made.any(axis=1))
     return made
@@ -65,12 +66,3 @@ def test_limbs_are_not_torn() -> None:
 
 def test_places_number_limbs_in_order() -> None:
     assert np.array_equal(limb_places(space_of([7, 7, 2, 5, 5])), [1, 1, 2, 3, 3])
-
-
-def test_the_share_does_not_change_what_is_drawn_afterwards() -> None:
-    following = []
-    for share in (0.0, 1.0):
-        rng = np.random.default_rng(1)
-        cross(rng, np.zeros((9, 3)), np.ones((9, 3)), space_of([0, 1, 2]), share=share, by="limbs")
-        following.append(rng.random())
-    assert following[0] == following[1]

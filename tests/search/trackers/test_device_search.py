@@ -15,10 +15,11 @@ from studio.foundations.errors import RunError, StudioError
 from studio.search.trackers import device_runs, frame_loop
 from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilter
 from studio.search.trackers.annealing import anneal
+from studio.search.trackers.condensation import Condensation
 from studio.search.trackers.counted_numbers import as_normals, as_share, random_words
-from studio.search.trackers.frame_loop import FrameSearch
+from studio.search.trackers.frame_loop import FrameSearch, search_frame
 from studio.search.trackers.particle_kernels import places
-from studio.search.trackers.settings import AnnealedSettings
+from studio.search.trackers.settings import AnnealedSettings, CondensationSettings
 from studio.search.trackers.tracker import start_of
 
 HERE = Path(__file__).parent
@@ -43,38 +44,6 @@ def simulated(tmp_path_factory):
     assert done.returncode == 0, done.stderr
     with np.load(place) as found:
         return dict(found)
-
-
-# Known answers of Philox 4x32-10, from the authors' own library: counter, key, words.
-KNOWN = (
-    ((0, 0, 0, 0), (0, 0), (0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8)),
-    ((0xFFFFFFFF,) * 4, (0xFFFFFFFF,) * 2, (0x408F276D, 0x41C83B0E, 0xA20BC7C6, 0x6D5451FD)),
-    (
-        (0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344),
-        (0xA4093822, 0x299F31D0),
-        (0xD16CFE09, 0x94FDCCEB, 0x5001E420, 0x24126EA1),
-    ),
-)
-
-
-@pytest.mark.parametrize(("counter", "key", "expected"), KNOWN)
-def test_counted_words_are_those_of_philox(counter, key, expected):
-    particle, place, layer, frame = map(np.uint64, counter)
-    seed = np.uint64(key[0] | key[1] << 32)
-    assert random_words(seed, frame, layer, particle, place) == expected
-
-
-def test_counted_numbers_are_spread_as_they_should_be():
-    words = np.array([random_words(9, 1, 2, n, 3) for n in range(20_000)], dtype=np.uint64)
-    shares = np.array([as_share(word) for word in words.ravel()])
-    assert shares.min() > 0.0
-    assert shares.max() < 1.0
-    assert abs(shares.mean() - 0.5) < 0.005
-    normals = np.array([as_normals(*row[:2]) for row in words]).ravel()
-    assert abs(normals.mean()) < 0.02
-    assert abs(normals.std() - 1.0) < 0.02
-    assert as_normals(np.uint64(0xFFFFFFFF), np.uint64(0))[0] == 0.0
-    assert np.isfinite(as_normals(np.uint64(0), np.uint64(0))).all()
 
 
 def words_of(run, particle, place):
@@ -187,6 +156,53 @@ def test_a_frame_is_searched_on_the_card_and_goes_on_elsewhere(simulated, proble
     assert simulated["search.evaluations"] == SETTINGS.layers * COUNT
     np.testing.assert_allclose(simulated["search.variances"][0], poses[1].var(axis=0), rtol=1e-4)
     np.testing.assert_allclose(simulated["search.weighed"][1], poses[1].var(axis=0), rtol=1e-4)
+
+
+def test_a_frame_is_the_processors_but_for_rounding(simulated, problem):
+    """The same seed is the same search: every particle of every layer, in a run's first two frames."""
+    weighting, space, poses = problem
+    found, previous = [], start_of(tuple(poses[0]))
+    for frame in range(2):
+        done = search_frame(
+            AnnealedParticleFilter(),
+            weighting,
+            previous,
+            space,
+            seed=5,
+            frame=frame,
+            settings_source=lambda: (0, SETTINGS),
+            repeats=2 - frame,
+            on_layer=found.append,
+        )
+        previous = done.carried
+    assert len(found) == 3 * SETTINGS.layers
+    np.testing.assert_allclose(
+        simulated["frames.poses"], np.stack([record.poses for record in found]), atol=2e-5
+    )
+    np.testing.assert_array_equal(
+        simulated["frames.parents"], np.stack([record.parents for record in found if record.parents.size])
+    )
+
+
+def test_condensation_is_the_processors_but_for_rounding(simulated, problem):
+    weighting, space, poses = problem
+    found, previous = [], start_of(tuple(poses[0]))
+    for frame in range(2):
+        settings = CondensationSettings(particles=COUNT, scale_frames=1)
+        done = search_frame(
+            Condensation(),
+            weighting,
+            previous,
+            space,
+            seed=5,
+            frame=frame,
+            settings_source=lambda settings=settings: (0, settings),
+            on_layer=found.append,
+        )
+        previous = done.carried
+    np.testing.assert_allclose(
+        simulated["condensation.poses"], np.stack([record.poses for record in found]), atol=2e-5
+    )
 
 
 def test_condensation_keeps_the_scale_that_its_first_frame_chose(simulated):

@@ -2,6 +2,7 @@
 frame whose swarm stays there, goes to the processor and comes back.
 """
 
+import dataclasses
 import importlib
 import inspect
 import os
@@ -259,6 +260,17 @@ def test_a_frame_resumed_after_any_layer_is_the_frame(simulated: dict[str, Any],
         equal_records(one, other)
     for array, value in frame["result"].carried.particles.extra.items():
         np.testing.assert_array_equal(value, resumed["result"].carried.particles.extra[array])
+
+
+@pytest.mark.parametrize("name", ["frame", "stages of one size"])
+def test_a_frame_is_the_processors_but_for_rounding(simulated: dict[str, Any], name: str) -> None:
+    """The same seed is the same search: every particle of every iteration of both searches."""
+    particles = made.SETTINGS.stage1_particles if name == "stages of one size" else 5
+    settings = dataclasses.replace(made.SETTINGS, stage2_particles=particles)
+    there, here = simulated[name][0]["records"], made.searched(settings, (False,) * 14)["records"]
+    for one, other in zip(there, here, strict=True):
+        np.testing.assert_allclose(one.poses, other.poses, atol=3e-6)
+        np.testing.assert_array_equal(one.log_weights, other.log_weights)
 
 
 def test_records_are_those_of_all_stages(simulated: dict[str, Any]) -> None:

@@ -12,12 +12,12 @@ from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilt
 from studio.search.trackers.frame_loop import (
     FrameSearch,
     SearchState,
-    beginning_generator,
     held_over,
     search_frame,
 )
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.settings import AnnealedSettings
-from studio.search.trackers.tracker import FilterState, FrameResult, LayerRecord, ParticleSet, generator
+from studio.search.trackers.tracker import FilterState, FrameResult, LayerRecord, ParticleSet
 
 TRACKER, SPACE = AnnealedParticleFilter(), toy_space(6)
 PROBLEM = Bowl(np.full(6, 0.4))
@@ -124,7 +124,7 @@ def test_misuse_raises() -> None:
 
 
 def test_random_numbers_of_all_moments_differ() -> None:
-    sources = [generator(7, frame, layer) for frame in range(3) for layer in range(-1, 5)]
-    sources += [beginning_generator(7, frame, repeat) for frame in range(3) for repeat in range(1, 4)]
-    assert len({source.random() for source in sources}) == 3 * 6 + 9
-    assert beginning_generator(7, 2, 0).random() == generator(7, 2, -1).random()
+    layers = [RandomNumbers(7, frame, layer) for frame in range(3) for layer in range(5)]
+    layers += [RandomNumbers.of_beginning(7, frame, search) for frame in range(3) for search in range(4)]
+    assert len({numbers.shares(1, 1)[0, 0] for numbers in layers}) == 3 * 5 + 3 * 4
+    assert RandomNumbers(7, 2, 20, search=1).beginning.key == RandomNumbers.of_beginning(7, 2, 1).key

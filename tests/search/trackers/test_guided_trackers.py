@@ -13,6 +13,7 @@ from studio.search.trackers.frame_loop import FrameSearch, SearchState, search_f
 from studio.search.trackers.guided_particles import STATES, VELOCITY
 from studio.search.trackers.guided_swarm import LEADER_STATE
 from studio.search.trackers.model_free import BEATEN
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.tracker import FilterState, FrameResult, LayerRecord, ParticleSet, SearchSpace
 from studio.sessions.results_codec import pack_layer, pack_result, unpack_layer, unpack_result
 
@@ -249,7 +250,7 @@ def test_without_prediction_a_model_changes_nothing(name: str) -> None:
 
 def test_a_start_without_a_pose_is_spread_over_the_clusters() -> None:
     tracker, settings = TRACKERS["behaviour"], settings_of("behaviour", particles=2000)
-    first = tracker.begin_frame(np.random.default_rng(0), FilterState(None), SPACE, settings)
+    first = tracker.begin_frame(RandomNumbers(0, 0, 0), FilterState(None), SPACE, settings)
     labels = MODEL.automaton.last_symbols[first.extra[STATES].astype(int)]
     assert set(labels) == {0, 1, 2, 3}
     assert np.abs(first.poses[:, :ROOT]).max() > 4.0
@@ -259,7 +260,7 @@ def test_a_start_without_a_pose_is_spread_over_the_clusters() -> None:
 def test_expectations_follow_the_clusters_that_particles_are_in() -> None:
     results, _ = followed("behaviour", 8)
     tracker, settings = TRACKERS["behaviour"], settings_of("behaviour", expected_most=2)
-    first = tracker.begin_frame(np.random.default_rng(0), results[-1].carried, SPACE, settings)
+    first = tracker.begin_frame(RandomNumbers(0, 0, 0), results[-1].carried, SPACE, settings)
     places = tracker.expectations(first, SPACE, settings)  # pyright: ignore[reportAttributeAccessIssue]
     assert 1 <= len(places) <= 2
     distances = np.abs(places[0, ROOT:] - MODEL.poses_only.means).max(axis=1)

@@ -53,8 +53,9 @@ def test_redraw_draws_only_what_is_impossible_and_stops_when_it_is_not() -> None
     problem = Picky(0.5)
     draws: list[list[int]] = []
 
-    def again(rows: Indices) -> Proposals:
+    def again(rows: Indices, attempt: int) -> Proposals:
         draws.append(rows.tolist())
+        assert attempt == len(draws)
         # Row 1 is possible with the second draw, row 3 with the fourth.
         values = [0.2 if (row, len(draws)) in {(1, 2), (3, 4)} else 0.9 for row in rows]
         return Proposals(column(values), np.full((len(rows), 3), float(len(draws))))
@@ -71,7 +72,7 @@ def test_after_ten_redraws_a_particle_stays_where_it_came_from() -> None:
     problem = Picky(0.5)
     draws: list[int] = []
 
-    def again(rows: Indices) -> Proposals:
+    def again(rows: Indices, _attempt: int) -> Proposals:
         draws.append(len(rows))
         return Proposals(column([0.9] * len(rows)), np.full((len(rows), 3), 7.0))
 
@@ -86,7 +87,7 @@ def test_after_ten_redraws_a_particle_stays_where_it_came_from() -> None:
 def test_where_nothing_is_possible_the_first_draw_stays() -> None:
     first = Proposals(column([0.6, 0.8]), np.full((2, 3), 3.0))
 
-    def again(rows: Indices) -> Proposals:
+    def again(rows: Indices, _attempt: int) -> Proposals:
         return Proposals(column([0.9] * len(rows)), np.zeros((len(rows), 3)))
 
     done = settled(Picky(-5.0), SPACE, rules("redraw"), first, column([0.0, 0.0]), again)

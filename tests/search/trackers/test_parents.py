@@ -8,6 +8,7 @@ from toy_problems import toy_hierarchy
 
 from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilter
 from studio.search.trackers.particles import unweighted
+from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.settings import AnnealedSettings
 from studio.search.trackers.tracker import NO_PARENT, SearchSpace
 from studio.sessions.results_codec import pack, pack_layer, unpack, unpack_layer
@@ -35,7 +36,7 @@ def test_without_noise_each_particle_is_made_of_its_parents() -> None:
     settings = AnnealedSettings(particles=count, layers=3, adaptive_diffusion=False, crossover=0.7)
     poses = np.random.default_rng(1).normal(size=(count, size))
     made, record = AnnealedParticleFilter().step_layer(
-        np.random.default_rng(2), unweighted(poses), 0, Hill(), space, settings
+        RandomNumbers(2, 0, 0), unweighted(poses), 0, Hill(), space, settings
     )
     first, second = record.parents
     assert record.parents.shape == (2, count)

@@ -12,6 +12,13 @@ import pytest
 from toy_problems import Bowl, toy_space
 
 from studio.foundations.errors import RunError
+from studio.search.trackers.counted_numbers import (
+    OF_TRIES,
+    OF_VELOCITIES,
+    as_normals,
+    as_share,
+    random_words,
+)
 from studio.search.trackers.frame_loop import FrameSearch, search_frame
 from studio.search.trackers.particle_swarm import (
     BEST_POSES,
@@ -22,8 +29,9 @@ from studio.search.trackers.particle_swarm import (
     acceleration,
     constriction,
 )
+from studio.search.trackers.random_numbers import BEGINNINGS, RandomNumbers
 from studio.search.trackers.swarm_settings import SwarmSettings
-from studio.search.trackers.tracker import FilterState, FrameResult, LayerRecord, ParticleSet, generator
+from studio.search.trackers.tracker import FilterState, FrameResult, LayerRecord, ParticleSet
 
 SWARM = ParticleSwarm()
 SPACE = toy_space(6)
@@ -85,13 +93,16 @@ class AlgorithmOne:
         self.settings, self.seed, self.frame = settings, seed, frame
         self.layer = 0
         self.visited: list[np.ndarray] = []
-        self.random = generator(seed, frame, -1)
+        self.number = BEGINNINGS
 
     def stage(self, start: np.ndarray, sigma: np.ndarray, count: int, iterations: int) -> np.ndarray:
         """p_g of one stage that starts from x̂."""
         dimensions = range(len(start))
-        normal = self.random.standard_normal((count, len(start)))
-        uniform = self.random.random((count, len(start)))
+        normal = [[self.normal(i, d) for d in dimensions] for i in range(count)]
+        uniform = [
+            [as_share(self.words(i, OF_VELOCITIES + d - d % 4)[d % 4]) for d in dimensions]
+            for i in range(count)
+        ]
         x = [[start[d] + normal[i][d] * sigma[d] for d in dimensions] for i in range(count)]
         v = [[(2.0 * uniform[i][d] - 1.0) * sigma[d] for d in dimensions] for i in range(count)]
         own = [list(pose) for pose in x]
@@ -100,13 +111,13 @@ class AlgorithmOne:
         leader, leader_value = list(own[best]), value[best]
         self.visited.append(np.array(x))
         for k in range(2, iterations + 1):
-            self.random = self.next_random()
+            self.begin_layer()
             c = (self.settings.c_last - self.settings.c_first) / (iterations - 2) * (
                 k - 2
             ) + self.settings.c_first
             phi = c + c
             chi = 2.0 / abs(2.0 - phi - math.sqrt(phi**2 - 4.0 * phi))
-            luck = self.random.random((2, count, len(start)))
+            luck = [[[self.luck(i, d, of) for d in dimensions] for i in range(count)] for of in range(2)]
             for i in range(count):
                 for d in dimensions:
                     drawn = luck[0][i][d] * (own[i][d] - x[i][d]), luck[1][i][d] * (leader[d] - x[i][d])
@@ -121,13 +132,27 @@ class AlgorithmOne:
                 if value[i] > leader_value:
                     leader, leader_value = list(own[i]), value[i]
             self.visited.append(np.array(x))
-        self.random = self.next_random()
+        self.begin_layer()
         return np.array(leader)
 
-    def next_random(self) -> np.random.Generator:
-        """Random numbers of one layer after the other."""
+    def begin_layer(self) -> None:
+        """Take the random numbers of one layer after the other."""
+        self.number = self.layer
         self.layer += 1
-        return generator(self.seed, self.frame, self.layer - 1)
+
+    def words(self, particle: int, place: int) -> tuple[int, ...]:
+        """Four words of a particle."""
+        return random_words(*map(np.uint64, (self.seed, self.frame, self.number, particle, place)))
+
+    def normal(self, particle: int, parameter: int) -> float:
+        """A normal number of a sample: two parameters have a counter."""
+        words = self.words(particle, OF_TRIES + parameter - parameter % 2)
+        return as_normals(words[0], words[1])[parameter % 2]
+
+    def luck(self, particle: int, parameter: int, of: int) -> float:
+        """ε1 or ε2 of a step."""
+        words = self.words(particle, OF_TRIES + parameter - parameter % 2)
+        return as_share(words[2 * (parameter % 2) + of])
 
     @staticmethod
     def fitness(pose: list[float]) -> float:
@@ -144,9 +169,9 @@ def test_the_swarm_is_algorithm_1() -> None:
     second = plain.stage(first, SPACE.sigma * calmed, 6, 7)
     assert len(records) == len(plain.visited) == 12
     for record, poses in zip(records, plain.visited, strict=True):
-        assert np.allclose(record.poses, poses, rtol=0, atol=1e-12)
-    assert np.allclose(result.estimate.pose, second, rtol=0, atol=1e-12)
-    assert result.estimate.log_weight == pytest.approx(float(-np.sum(second**2)), abs=1e-12)
+        assert np.allclose(record.poses, poses, rtol=0, atol=1e-6)
+    assert np.allclose(result.estimate.pose, second, rtol=0, atol=1e-6)
+    assert result.estimate.log_weight == pytest.approx(float(-np.sum(second**2)), abs=1e-6)
 
 
 def test_velocities_stay_within_two_sigma() -> None:
@@ -161,7 +186,7 @@ def test_velocities_stay_within_two_sigma() -> None:
 
 def test_the_start_is_sampled_as_the_paper_has_it() -> None:
     settings = dataclasses.replace(SMALL, stage1_particles=2000)
-    swarm = SWARM.begin_frame(generator(0, 0, -1), started(), SPACE, settings)
+    swarm = SWARM.begin_frame(RandomNumbers.of_beginning(0, 0), started(), SPACE, settings)
     velocities = swarm.extra[VELOCITIES][:, :2]
     assert np.allclose(swarm.poses[:, :2].mean(axis=0), START[:2], atol=4 * 0.3 / math.sqrt(2000))
     assert np.allclose(swarm.poses[:, :2].std(axis=0), 0.3, rtol=0.08)
@@ -169,7 +194,10 @@ def test_the_start_is_sampled_as_the_paper_has_it() -> None:
     assert np.allclose(velocities.std(axis=0), 0.3 / math.sqrt(3), rtol=0.08)
     assert np.array_equal(swarm.poses[:, 2:], np.broadcast_to(START[2:], (2000, 4)))
     still = SWARM.begin_frame(
-        generator(0, 0, -1), started(), SPACE, dataclasses.replace(settings, start_velocity="zero")
+        RandomNumbers.of_beginning(0, 0),
+        started(),
+        SPACE,
+        dataclasses.replace(settings, start_velocity="zero"),
     )
     assert np.array_equal(still.poses, swarm.poses)
     assert not still.extra[VELOCITIES].any()
@@ -233,11 +261,14 @@ def test_the_reported_pose_is_the_best_or_the_mean_of_bests() -> None:
 def test_a_frame_starts_from_the_reported_pose() -> None:
     still = dataclasses.replace(SPACE, sigma=np.zeros(6))
     first, _, _ = searched(dataclasses.replace(SMALL, estimate="mean"))
-    begun = SWARM.begin_frame(generator(0, 9, -1), first.carried, still, SMALL)
+    begun = SWARM.begin_frame(RandomNumbers.of_beginning(0, 9), first.carried, still, SMALL)
     assert np.allclose(begun.poses, first.estimate.pose, atol=0, rtol=0)
     moving = FilterState(first.carried.particles, first.estimate.pose, first.estimate.pose - 0.25)
     ahead = SWARM.begin_frame(
-        generator(0, 9, -1), moving, still, dataclasses.replace(SMALL, dynamics="constant_velocity")
+        RandomNumbers.of_beginning(0, 9),
+        moving,
+        still,
+        dataclasses.replace(SMALL, dynamics="constant_velocity"),
     )
     assert np.allclose(ahead.poses, first.estimate.pose + 0.25)
 

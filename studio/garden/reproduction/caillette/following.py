@@ -32,6 +32,7 @@ from studio.search.likelihood.problem import FittedToPoses, FrameLikelihood, Qua
 from studio.search.settings import RunSettings, changed_settings, default_settings
 from studio.search.trackers.guided_particles import spread_over_clusters
 from studio.search.trackers.loss_detection import Onlooker
+from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.tracker import FilterState, FrameResult, LayerRecord, start_of
 from studio.sessions.session import Session
 
@@ -257,7 +258,7 @@ class Recovering(Following):
         for kept in (self.poses, self.log_weights, self.memories, self.overlaps):
             kept.pop()
         tracker = self.settings.tracker
-        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((self.seed, frame, RESET_KEY))))
+        rng = keyed_generator(self.seed, frame, RESET_KEY)
         sigma = self.space.sigma * tracker.diffusion_scale
         spread = spread_over_clusters(rng, self.space, tracker.particles, root, sigma)
         self.carried = dataclasses.replace(before, particles=spread)

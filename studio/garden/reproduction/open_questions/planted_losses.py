@@ -43,8 +43,9 @@ from studio.runs.setup.shape_on_the_way import fit_session_shape
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, default_settings
 from studio.search.trackers.agreement import FAR_MM, Agreement, limb_names
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
+from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import RefinementSettings, Refiner
-from studio.search.trackers.tracker import LIMB_LOST_PROBABILITY, LIMB_LOST_SHARE, keyed_generator
+from studio.search.trackers.tracker import LIMB_LOST_PROBABILITY, LIMB_LOST_SHARE
 
 BODY = "human35"
 FRAMES, QUICK_FRAMES = 8, 2
