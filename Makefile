@@ -10,7 +10,7 @@ TOOLS := node_modules/.package-lock.json
 # Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: env as-before browser demo gallery-pictures test test-fast test-slow faults fuzz hostile races soak watching audit test-opencv-4 check check-types check-style check-pages bench card growth lock guide pictures wheel-test clean
+.PHONY: env as-before browser demo gallery-pictures test test-fast test-slow faults fuzz hostile races mutants soak watching audit test-opencv-4 check check-types check-style check-pages bench card growth lock guide pictures wheel-test clean
 
 env: $(READY)
 
@@ -67,6 +67,11 @@ hostile: env
 # `RACES="--seed 7 --groups 1"` fires a group again.
 races: env
 	PYTHONPATH=tests $(BIN)/python -m races $(or $(RACES),--groups 2000)
+
+# Small changes to the science rooms' code, one at a time, and which of them no test of the room notices; goes on where it
+# was stopped. `MUTANTS="search/behaviour --count 50 --seed 7"` draws others, `MUTANTS=--again` tries what survived.
+mutants: env
+	PYTHONPATH=tests $(BIN)/python -m mutants $(MUTANTS)
 
 # What the studio gave before its files moved into twelve rooms, beside what it gives now.
 as-before: env

@@ -7,15 +7,42 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
+from studio.cli.inspection_commands import MOST_ROWS
 from studio.cli.main import main
 from studio.operations.inspecting import tables_csv
 from studio.sessions.session import Session
 
 
-def test_a_layer_is_named_as_the_tables_count_it(session_on_disk: Session, tmp_path: Path) -> None:
-    runner = CliRunner()
+def tracked(runner: CliRunner) -> CliRunner:
+    """The runner after a run, "one", of two frames."""
     knobs = ["--particles", "20", "--layers", "3", "--set", "constraints=clamp"]
     assert runner.invoke(main, ["track", "toy", *knobs, "--name", "one", "--frames", "0:2"]).exit_code == 0
+    return runner
+
+
+def test_the_tables_are_drawn_row_by_row(session_on_disk: Session, tmp_path: Path) -> None:
+    runner, file = tracked(CliRunner()), tmp_path / "variance.csv"
+    words = ["view", "toy", "one", "--view", "variance", "--frame", "1"]
+    assert runner.invoke(main, [*words, "--csv", str(file)]).exit_code == 0
+    drawn = [
+        [cell.strip() for cell in line.split("│")] for line in runner.invoke(main, words).output.splitlines()
+    ]
+    tables = [list(csv.reader(io.StringIO(part)))[2:] for part in file.read_text().split("# ")[2:]]
+    assert sum(map(len, tables)) > 3
+    for row in (row for rows in tables for row in rows[:MOST_ROWS]):
+        assert any(all(map(same, row, cells[1:])) for cells in drawn if len(cells) == len(row) + 2), row
+
+
+def same(written: str, drawn: str) -> bool:
+    """Whether a cell of a file and one of a terminal, which rounds, say the same."""
+    try:
+        return written == drawn or f"{float(written):.4g}" == drawn
+    except ValueError:
+        return False
+
+
+def test_a_layer_is_named_as_the_tables_count_it(session_on_disk: Session, tmp_path: Path) -> None:
+    runner = tracked(CliRunner())
     words = ["view", "toy", "one", "--view", "weights", "--frame", "1"]
     file = tmp_path / "weights.csv"
     printed = runner.invoke(main, [*words, "--layer", "3", "--csv", str(file)])

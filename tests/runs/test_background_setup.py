@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from toy_footage import write_video
 
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
@@ -166,6 +167,21 @@ def test_sources_that_are_not_there_are_refused(session: Session) -> None:
     with pytest.raises(SettingsError):
         set_up_background(session, "median", knobs={"mask_threshold": -1.0})
     assert read_evidence(session).knobs == {}
+
+
+def test_a_picture_is_no_clip_and_a_clip_no_picture(session: Session, tmp_path: Path) -> None:
+    given = set_backgrounds(session, plates(tmp_path, change=False))
+    with pytest.raises(FootageError, match="cam0 is a picture, no clip"):
+        set_up_background(given, "clip", tune=False)
+    assert set_up_background(given, "plate", tune=False).source == "plate"
+    clips = {
+        name: write_video(tmp_path / f"{name}.mp4", [cv2.imread(str(file))] * 3)
+        for name, file in plates(tmp_path, change=False).items()
+    }
+    given = set_backgrounds(Session(session.path), clips)
+    with pytest.raises(FootageError, match="cam0 is a video, no plate"):
+        set_up_background(given, "plate", tune=False)
+    assert set_up_background(given, "clip", tune=False).source == "clip"
 
 
 def test_medians_are_of_empty_frames_only() -> None:

@@ -9,10 +9,10 @@ from small_recipes import small
 from studio.body.forward_kinematics import marker_points
 from studio.body.motion_files.trc import read_trc
 from studio.footage.capture.calibration_files import read_calibration, write_calibration
-from studio.foundations.errors import SessionError
+from studio.foundations.errors import SessionError, StudioError
 from studio.foundations.geometry.projection import project
 from studio.results.drawing_footage.recipe_file import read_recipe, recipe_cameras
-from studio.results.drawing_footage.recipes import synthesize
+from studio.results.drawing_footage.recipes import people_beside, synthesize
 from studio.results.evaluation.errors import evaluate
 from studio.sessions.session import Session
 
@@ -70,6 +70,41 @@ def test_masks_and_pictures_on_wish_and_the_same_bytes_again(tmp_path: Path) -> 
     assert np.count_nonzero(mask) > 200
     for path in sorted(one.rglob("*.mp4")):
         assert path.read_bytes() == (two / path.relative_to(one)).read_bytes(), path.name
+
+
+def test_a_session_has_what_its_recipe_includes_and_the_start_pose_its_error(tmp_path: Path) -> None:
+    bare = {"include__truth": False, "include__subject": False, "include__start_pose": False}
+    without = Session(synthesize(small(tmp_path, "stand", frames=1, **bare), tmp_path / "bare"))
+    assert (without.truth_path, without.start_pose()) == (None, None)
+    assert not (without.path / "subject.toml").exists()
+    errors = []
+    for noise in (0.0, 40.0):
+        recipe = small(tmp_path, "stand", frames=1, title="One", include__start_pose_noise_mm=noise)
+        made = Session(synthesize(recipe, tmp_path / f"{noise}"))
+        assert (made.manifest.title, made.manifest.imported_from) == ("One", "recipe stand.toml")
+        assert made.subject().lengths_mm
+        body, pose = made.body(), made.start_pose()
+        assert pose is not None
+        assert made.truth_path is not None
+        truth = read_trc(made.truth_path)
+        errors.append(evaluate(pose[None], np.array([0]), body, truth, made.manifest.fps).mean_mm)
+    assert errors[0] < 6.0 < 15.0 < errors[1] < 80.0
+
+
+def test_only_people_of_as_many_frames_stand_beside(tmp_path: Path) -> None:
+    recipe = read_recipe(small(tmp_path, "stand", beside=["other.toml"]))
+    changes: list[dict[str, object]] = [{}, {"frames": 5}, {"fps": 7}]
+    for changed in changes:
+        small(tmp_path, "walk", **changed).rename(tmp_path / "other.toml")
+        if changed:
+            with pytest.raises(StudioError, match=r"'other\.toml' cannot be beside"):
+                people_beside(recipe, tmp_path)
+        else:
+            ((person, motion),) = people_beside(recipe, tmp_path, frames=2)
+            assert (person.motion, motion.frame_count) == ("walk", 2)
+    small(tmp_path, "planar_arm").rename(tmp_path / "other.toml")
+    with pytest.raises(StudioError, match=r"'other\.toml' cannot be beside"):
+        people_beside(recipe, tmp_path)
 
 
 def test_cameras_of_a_calibration_file_are_used(tmp_path: Path) -> None:
