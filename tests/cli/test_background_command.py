@@ -1,7 +1,7 @@
 """`studio background` says what comes next where masks are of no use."""
 
 import pytest
-from click.testing import CliRunner
+from command_line import call
 
 from studio.cli.main import main
 from studio.cli.mask_commands import _answer
@@ -28,7 +28,7 @@ def test_made_masks_are_not_thrown_away_for_it(session_on_disk: Session) -> None
 
 
 def test_the_command_that_is_named_is_one(session_on_disk: Session) -> None:
-    help_text = CliRunner().invoke(main, ["background", "--help"]).stdout
+    help_text = call("background --help").stdout
     assert "best" in help_text
     with pytest.raises(SystemExit):
         main(["background", "no-such-session", "--source", "best"])

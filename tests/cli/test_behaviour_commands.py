@@ -1,16 +1,14 @@
 """`studio learn` and `studio models` as a stranger calls them."""
 
-import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from command_line import answer_of, call, refusal_of
 from moving_bodies import c3d_of, swinging
 
 from studio.body.catalogue import load_body
-from studio.cli.main import main
 from studio.operations import behaviours
 from studio.sessions.workspace import Workspace, begin_session, workspace_root
 
@@ -28,10 +26,6 @@ QUICK = (
 BY_NAME = ("--body", "human25")
 
 
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
-
-
 @pytest.fixture
 def motions(tmp_path: Path) -> Path:
     """A folder with two motions and something else."""
@@ -45,31 +39,23 @@ def motions(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 def test_learn_tells_numbers_and_models_lists(motions: Path, tmp_path: Path) -> None:
-    result = run("learn", str(motions), "--into", "mine", *QUICK, *BY_NAME, "--memory", "3", "--json")
-    assert result.exit_code == 0, result.stderr
-    printed = json.loads(result.stdout)
+    printed = answer_of("learn", motions, "--into", "mine", *QUICK, *BY_NAME, "--memory", "3")
     assert {"frames", "clusters", "states", "entropy_train", "entropy_test"} <= set(printed)
     assert printed["frames"] == 2 * (48 + 47)
     assert (printed["recorded_frames"], printed["test_frames"], printed["body"]) == (96, 24, "human25")
     assert [entry["name"] for entry in printed["sources"]] == ["one", "two"]
     assert all(entry["rms_mm"] < 8.0 for entry in printed["sources"])
     assert Path(printed["path"]) == workspace_root() / "models" / "mine.behaviour"
-    listed = json.loads(run("models", "--json").stdout)["models"]
+    listed = answer_of("models")["models"]
     assert [(entry["name"], entry["memory"], entry["clusters"]) for entry in listed] == [
         ("mine", 3, printed["clusters"])
     ]
-    assert "mine" in run("models").stdout
+    assert "mine" in call("models").stdout
     before = Path(printed["path"]).read_bytes()
-    again = run("learn", str(motions), "--into", "mine", *QUICK)
-    assert again.exit_code == 2
-    assert "--force" in again.stderr
+    assert "--force" in refusal_of("learn", motions, "--into", "mine", *QUICK)
     assert Path(printed["path"]).read_bytes() == before
-    replaced = run(
-        *("learn", str(motions / "one.c3d"), "--test", str(motions / "two.c3d"), str(motions / "one.c3d")),
-        *("--into", "mine", "--force", *QUICK, "--json"),
-    )
-    assert replaced.exit_code == 0, replaced.stderr
-    printed = json.loads(replaced.stdout)
+    tested = (motions / "one.c3d", "--test", motions / "two.c3d", motions / "one.c3d")
+    printed = answer_of("learn", *tested, "--into", "mine", "--force", *QUICK)
     assert (printed["recorded_frames"], printed["test_frames"]) == (60, 120)
 
 
@@ -88,10 +74,7 @@ def test_wrong_calls_are_refused_and_leave_nothing(motions: Path, tmp_path: Path
         ("learn", str(motions), "--into", "m", "--test"): "--test",
     }
     for arguments, words in cases.items():
-        result = run(*arguments)
-        assert result.exit_code == 2, arguments
-        assert words in result.stderr
-        assert "Traceback" not in result.stderr
+        assert words in refusal_of(*arguments)
     assert not (workspace_root() / "models").exists()
 
 
@@ -100,8 +83,7 @@ def test_a_cancelled_learning_leaves_nothing(motions: Path, monkeypatch: pytest.
         raise KeyboardInterrupt
 
     monkeypatch.setattr(behaviours, "learn_from", interrupted)
-    result = run("learn", str(motions / "one.c3d"), "--into", "mine", *QUICK)
-    assert result.exit_code == 130
+    call("learn", motions / "one.c3d", "--into", "mine", *QUICK, code=130)
     assert not (workspace_root() / "models").exists()
 
 
@@ -111,8 +93,7 @@ def test_frames_that_the_body_cannot_follow_are_named(tmp_path: Path) -> None:
     names = [entry.name for entry in BODY.parameters]
     poses[20:26, names.index("left_hip_spread")] = np.radians(178.0)
     path = c3d_of(tmp_path / "split.c3d", BODY, poses, 30.0)
-    result = run("learn", str(path), "--into", "mine", *QUICK)
-    assert result.exit_code == 0, result.stderr
+    result = call("learn", path, "--into", "mine", *QUICK)
     assert "split: " in result.stderr
     assert "fit badly" in result.stderr
 
@@ -122,7 +103,7 @@ def test_learn_takes_the_body_that_the_sessions_have(motions: Path) -> None:
     """Where most of the workspace's sessions have another body than a new one would, that is the model's."""
     for name, body in (("a", "human25"), ("b", "human31"), ("c", "human25")):
         begin_session(workspace_root() / name, body=body)
-    printed = json.loads(run("learn", str(motions), "--into", "mine", *QUICK, "--json").stdout)
+    printed = answer_of("learn", motions, "--into", "mine", *QUICK)
     assert printed["body"] == "human25"
     shutil.rmtree(workspace_root() / "a")
     shutil.rmtree(workspace_root() / "c")

@@ -1,13 +1,10 @@
 """`studio check`, and the same as a verb: jumps are told by frame and limb."""
 
-import json
-
 import numpy as np
-from click.testing import CliRunner
+from command_line import answer_of, call
 from toy_session import FRAMES, true_poses
 
 import studio
-from studio.cli.main import main
 from studio.runs.new_run import prepare_run
 from studio.runs.tracks import Track, write_track
 from studio.sessions.session import Session
@@ -26,16 +23,11 @@ def test_a_leap_is_reported_and_kept(session_on_disk: Session) -> None:
     wrong[5:, 0] += 1.0
     kept(session_on_disk, "smoothed", wrong)
     kept(session_on_disk, "good", true_poses())
-    printed = CliRunner().invoke(
-        main, ["check", "toy", "one", "--every", "3", "--json"], catch_exceptions=False
-    )
-    assert printed.exit_code == 0, printed.output
-    found = json.loads(printed.stdout)
+    found = answer_of("check toy one --every 3")
     assert (found["track"], found["good"]) == ("smoothed", False)
     assert [(jump["frame"], jump["limb"]) for jump in found["jumps"]] == [(5, "arm")]
     assert found["frames"] == list(range(0, FRAMES, 3))
-    said = CliRunner().invoke(main, ["workflow", "toy"], catch_exceptions=False)
-    assert said.exit_code == 0
+    call("workflow toy")
     again = studio.check("toy/one", every=4)
     assert "1 jump (frame 5, arm)" in again.in_words()
     right = studio.check("toy/one", "good", every=4)

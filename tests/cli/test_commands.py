@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from command_line import answer_of, call, refusal_of
 from sample_walk import WALK, copy_of_walk
 
 from studio.cli import output
-from studio.cli.main import COMMANDS, load, main, summary
+from studio.cli.main import COMMANDS, load, summary
 from studio.cli.output import progress_lines
 from studio.operations.jobs.open_run import OpenRun
 from studio.runs.new_run import prepare_run
@@ -22,29 +22,9 @@ from studio.runs.tracking_run import Stepped
 from studio.sessions.session import Session
 
 
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
-
-
-def printed(*arguments: str) -> dict:
-    result = run(*arguments, "--json")
-    assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout)
-
-
-def refused(*arguments: str) -> str:
-    """What a wrong call says; its cause and remedy are one line each, and no traceback is shown."""
-    result = run(*arguments)
-    assert result.exit_code == 2
-    assert result.stdout == ""
-    assert "Traceback" not in result.stderr
-    return result.stderr
-
-
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help(name: str) -> None:
-    result = run(name, "--help")
-    assert result.exit_code == 0
+    result = call(name, "--help")
     assert "--json" in result.output
 
 
@@ -56,7 +36,7 @@ def test_the_list_of_commands_says_what_each_ones_help_begins_with(name: str) ->
 
 
 def test_bodies_lists_parameters_and_limbs() -> None:
-    bodies = {entry["name"]: entry for entry in printed("bodies")["bodies"]}
+    bodies = {entry["name"]: entry for entry in answer_of("bodies")["bodies"]}
     assert bodies["human31"]["parameters"] == 31
     assert bodies["human31"]["limbs"] == 10
     assert {"Hip", "Neck", "Head", "RWrist"} <= set(bodies["human31"]["markers"])
@@ -64,19 +44,8 @@ def test_bodies_lists_parameters_and_limbs() -> None:
 
 def test_track_writes_poses_in_the_bodys_order(session_on_disk: Session, tmp_path: Path) -> None:
     poses = tmp_path / "poses.csv"
-    arguments = (
-        "track",
-        session_on_disk.name,
-        "--frames",
-        "0:2",
-        "--particles",
-        "40",
-        "--layers",
-        "3",
-        "--seed",
-        "7",
-    )
-    first = printed(*arguments, "--poses", str(poses))
+    line = "track toy --frames 0:2 --particles 40 --layers 3 --seed 7"
+    first = answer_of(line, "--poses", poses)
     assert first["frames"] == 2
     assert first["seed"] == 7
     assert first["evaluations_per_frame"] == 120
@@ -84,16 +53,14 @@ def test_track_writes_poses_in_the_bodys_order(session_on_disk: Session, tmp_pat
     body = session_on_disk.body()
     assert rows[0] == ["frame", *(parameter.name for parameter in body.parameters)]
     assert [row[0] for row in rows[1:]] == ["0", "1"]
-    printed(*arguments, "--poses", str(tmp_path / "again.csv"))
+    answer_of(line, "--poses", tmp_path / "again.csv")
     assert (tmp_path / "again.csv").read_text() == poses.read_text()
-    listed = printed("runs", session_on_disk.name)["runs"]
+    listed = answer_of("runs toy")["runs"]
     assert [entry["done"] for entry in listed] == [2, 2]
 
 
 def test_condensation_prints_its_likelihood_scale(session_on_disk: Session) -> None:
-    answer = printed(
-        "track", session_on_disk.name, "--tracker", "condensation", "--frames", "0:2", "--particles", "60"
-    )
+    answer = answer_of("track toy --tracker condensation --frames 0:2 --particles 60")
     assert answer["likelihood_scale"] > 0.0
 
 
@@ -116,16 +83,16 @@ def test_wrong_settings_leave_the_session_untouched(
     session_on_disk: Session, extra: list[str], word: str
 ) -> None:
     before = sorted(session_on_disk.path.rglob("*"))
-    assert word in refused("track", session_on_disk.name, *extra)
+    assert word in refusal_of("track toy", *extra)
     assert sorted(session_on_disk.path.rglob("*")) == before
 
 
 def test_an_unknown_session_is_named_with_where_it_was_sought() -> None:
-    assert "no session 'nobody'" in refused("track", "nobody")
+    assert "no session 'nobody'" in refusal_of("track nobody")
 
 
 def test_an_unknown_session_is_answered_with_those_there_are(session_on_disk: Session) -> None:
-    assert f"'{session_on_disk.name}'" in refused("track", "nobody")
+    assert f"'{session_on_disk.name}'" in refusal_of("track nobody")
 
 
 def test_ctrl_c_keeps_the_run_and_writes_its_poses(
@@ -140,12 +107,11 @@ def test_ctrl_c_keeps_the_run_and_writes_its_poses(
 
     monkeypatch.setattr(OpenRun, "step_layer", interrupted)
     poses = tmp_path / "poses.csv"
-    asked = ("--frames", "0:3", "--particles", "20", "--layers", "2", "--poses", str(poses), "--json")
-    result = run("track", session_on_disk.name, *asked)
-    assert (result.exit_code, result.stdout) == (130, "")
+    result = call("track toy --frames 0:3 --particles 20 --layers 2 --json --poses", poses, code=130)
+    assert result.stdout == ""
     assert "1 of 3 frames" in result.stderr
     assert len(poses.read_text().splitlines()) == 2
-    (listed,) = printed("runs", session_on_disk.name)["runs"]
+    (listed,) = answer_of("runs toy")["runs"]
     assert (listed["done"], listed["status"]) == (1, "cancelled")
 
 
@@ -157,15 +123,15 @@ def test_a_folder_that_cannot_be_written_to_is_no_fault_of_the_studio(
 
     monkeypatch.setattr(tempfile, "mkdtemp", read_only)
     monkeypatch.setattr(os, "mkdir", read_only)
-    said = refused("track", session_on_disk.name, "--frames", "0:1")
-    assert f"The folder '{session_on_disk.path / 'runs'}' cannot be written (Permission denied)." in said
+    assert (
+        f"The folder '{session_on_disk.path / 'runs'}' cannot be written (Permission denied)."
+        in refusal_of("track toy --frames 0:1")
+    )
 
 
 def test_evaluate_needs_a_truth(session_on_disk: Session) -> None:
-    run_name = printed(
-        "track", session_on_disk.name, "--frames", "0:1", "--particles", "20", "--layers", "2"
-    )["run"]
-    assert "--truth" in refused("evaluate", session_on_disk.name, run_name)
+    run_name = answer_of("track toy --frames 0:1 --particles 20 --layers 2")["run"]
+    assert "--truth" in refusal_of("evaluate toy", run_name)
 
 
 def test_start_pose_file_is_taken(session_on_disk: Session, tmp_path: Path) -> None:
@@ -178,9 +144,7 @@ def test_start_pose_file_is_taken(session_on_disk: Session, tmp_path: Path) -> N
         + ",".join(map(repr, pose.tolist()))
         + "\n"
     )
-    answer = printed(
-        "track", session_on_disk.name, "--frames", "0:1", "--particles", "20", "--start-pose", str(path)
-    )
+    answer = answer_of("track toy --frames 0:1 --particles 20 --start-pose", path)
     record = session_on_disk.run(answer["run"]).record
     assert record.start_pose == pytest.approx(tuple(pose))
     assert "pose.csv" in record.start_source
@@ -189,30 +153,30 @@ def test_start_pose_file_is_taken(session_on_disk: Session, tmp_path: Path) -> N
 def test_import_refuses_a_folder_that_is_no_session_and_leaves_nothing(tmp_path: Path) -> None:
     (tmp_path / "source" / "videos").mkdir(parents=True)
     (tmp_path / "source" / "videos" / "cam1.mp4").write_bytes(b"no video")
-    said = refused("import", str(tmp_path / "source"), "--into", "made")
+    said = refusal_of("import", tmp_path / "source", "--into", "made")
     assert "calibration" in said
     assert "remedy" in said
-    assert "no session 'made'" in refused("track", "made")
+    assert "no session 'made'" in refusal_of("track made")
 
 
 @pytest.mark.slow
 def test_evaluate_prints_numbers_with_their_alignment(tmp_path: Path) -> None:
     session = str(copy_of_walk(tmp_path / "walk").path)
-    tracked = printed("track", session, "--frames", "0:3", "--particles", "100", "--layers", "5")
-    found = printed("evaluate", session, tracked["run"])
+    tracked = answer_of("track", session, "--frames", "0:3", "--particles", "100", "--layers", "5")
+    found = answer_of("evaluate", session, tracked["run"])
     assert found["mean_mm"] < 40.0
     assert found["worst_mm"] >= found["mean_mm"]
     assert found["lost_frames"] == 0
     assert found["alignment"] == "none"
     assert len(found["per_frame_mm"]) == 3
     assert set(found["per_marker_mm"]) >= {"Head", "RWrist", "LAnkle"}
-    start = printed("track", session, "--frames", "1:2", "--start-pose", str(WALK / "truth" / "walk.trc"))
+    start = answer_of("track", session, "--frames", "1:2", "--start-pose", WALK / "truth" / "walk.trc")
     assert "markers of walk.trc" in start["start_pose"]
 
 
 def test_a_cancelled_run_is_resumed_with_the_result_of_an_unbroken_one(session_on_disk: Session) -> None:
-    arguments = ("track", session_on_disk.name, "--particles", "30", "--layers", "3", "--frames", "0:4")
-    whole = printed(*arguments, "--name", "whole")
+    arguments = ("track", "toy", "--particles", "30", "--layers", "3", "--frames", "0:4")
+    whole = answer_of(*arguments, "--name", "whole")
     run_ = prepare_run(session_on_disk, last=4, knobs={"particles": 30, "layers": 3}, name="broken")
     opened = OpenRun(str(session_on_disk.path), str(run_.folder))
     for _ in range(8):
@@ -220,7 +184,7 @@ def test_a_cancelled_run_is_resumed_with_the_result_of_an_unbroken_one(session_o
     opened.tracking.mark_cancelled()
     opened.close()
     assert run_.summary().status == "cancelled"
-    assert printed("track", session_on_disk.name, "--resume", "broken")["frames"] == 4
+    assert answer_of("track toy --resume broken")["frames"] == 4
     poses = []
     for name in (whole["run"], "broken"):
         with session_on_disk.run(name).results() as results:
@@ -264,9 +228,7 @@ def test_too_little_memory_to_load_a_command_is_said(monkeypatch: pytest.MonkeyP
         raise ImportError(f"{name}.so: failed to map segment from shared object")
 
     monkeypatch.setattr("importlib.import_module", load)
-    result = CliRunner().invoke(main, ["runs"])
-    assert result.exit_code == 2
-    assert "not enough memory to load the studio" in result.stderr
+    assert "not enough memory to load the studio" in refusal_of("runs")
 
 
 def test_too_little_memory_is_no_fault_of_the_studio(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,10 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from command_line import answer_of, call, refusal_of
 from sample_walk import copy_of_walk
 
-from studio.cli.main import main
 from studio.operations import comparing
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
@@ -24,22 +23,12 @@ def walk() -> Session:
     return copy_of_walk(workspace.root / "walk")
 
 
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(main, ["compare", *arguments], catch_exceptions=False)
-
-
-def printed(*arguments: str) -> dict:
-    result = run(*arguments, "--json")
-    assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout)
-
-
 @pytest.mark.slow
 def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
     out = tmp_path / "found"
     changes = ("--set", "annealed:b.crossover=0", "--set", "diffusion_scale=0.8")
     three = ("walk", "--trackers", "annealed,annealed:b,condensation", "--seeds", "2", *SMALL, *changes)
-    found = printed(*three, "--out", str(out))
+    found = answer_of("compare", *three, "--out", out)
     assert [entry["tracker"] for entry in found["trackers"]] == ["annealed", "annealed:b", "condensation"]
     for entry in found["trackers"]:
         assert entry.keys() == FIELDS | {"seeds"}
@@ -58,12 +47,11 @@ def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
     assert not (walk.path / "comparisons").exists()
 
     # The same command finds all of it there; another one is refused that folder.
-    again = run(*three, "--out", str(out))
+    again = call("compare", *three, "--out", out)
     assert "6 of 6 trials are there already" in again.stderr
-    assert again.exit_code == 0
-    other = run("walk", "--trackers", "annealed", "--seeds", "2", *SMALL, "--out", str(out))
-    assert other.exit_code == 2
-    assert "other candidates" in other.stderr
+    assert "other candidates" in refusal_of(
+        "compare walk --trackers annealed --seeds 2", *SMALL, "--out", out
+    )
 
 
 @pytest.mark.slow
@@ -79,12 +67,11 @@ def test_after_ctrl_c_the_same_command_goes_on(walk: Session, monkeypatch: pytes
         return really(kept, session, report, made, **more)  # pyright: ignore[reportArgumentType]
 
     monkeypatch.setattr(comparing, "run_comparison", interrupted)
-    stopped = run(*arguments)
-    assert stopped.exit_code == 130
+    stopped = call("compare", *arguments, code=130)
     assert "finished is kept" in stopped.stderr
     monkeypatch.undo()
     monkeypatch.setenv("STUDIO_WORKSPACE", str(walk.path.parent))
-    done = run(*arguments)
+    done = call("compare", *arguments)
     assert "1 of 2 trials are there already" in done.stderr
     assert "annealed" in done.stdout
     assert "is nearer than" in done.stdout
@@ -101,37 +88,28 @@ def test_wrong_calls_are_refused_with_a_remedy(walk: Session, session_on_disk: S
         (("walk", "--trackers", "annealed", "--evaluations", "1"), "too few"),
         (("walk", "--trackers", "annealed", "--body", "nobody"), "nobody"),
     ):
-        result = run(*arguments)
-        assert result.exit_code == 2, arguments
-        assert words in result.stderr
-        assert "remedy" in result.stderr
-        assert "Traceback" not in result.stderr
+        result = refusal_of("compare", *arguments)
+        assert words in result
+        assert "remedy" in result
     assert not (walk.path / "comparisons").exists()
 
 
 def test_help_explains_labels() -> None:
-    text = run("--help").output
+    text = call("compare --help").output
     assert "--set annealed:few.layers=4" in text
     assert "annealed:eq13:" in text
     assert "partitions:" in text
 
 
-def swept(*arguments: str) -> Result:
-    return CliRunner().invoke(main, ["sweep", "walk", *arguments], catch_exceptions=False)
-
-
 @pytest.mark.slow
 def test_a_sweep_is_reported_of_before_and_printed_after(walk: Session) -> None:
     small = ("--seeds", "1", "--frames", "0:2", "--layers", "2", "--particles", "10", "--keep-shape")
-    done = swept("--vary", "survival=0.2,0.5", *small, "--processes", "1", "--json")
-    assert done.exit_code == 0, done.stderr
+    done = call("sweep walk --vary survival=0.2,0.5", *small, "--processes", "1", "--json")
     assert "2 runs of 2 frames, 80 evaluations; how long that takes is known once" in done.stderr
     found = json.loads(done.stdout)
     assert found["vary"] == {"survival": [0.2, 0.5]}
     assert [row[2] for row in found["tables"][0]["rows"]] == ["sweep-1-p1-s0", "sweep-1-p2-s0"]
     assert {run.name for run in walk.runs()} == {"sweep-1-p1-s0", "sweep-1-p2-s0"}
     for words, said in (("survival=7", "cannot be '7'"), ("survival", "names no values")):
-        refused = swept("--vary", words, *small)
-        assert refused.exit_code == 2
-        assert said in refused.stderr
-    assert "Missing option '--vary'" in swept(*small).stderr
+        assert said in refusal_of("sweep walk --vary", words, *small)
+    assert "Missing option '--vary'" in refusal_of("sweep walk", *small)

@@ -1,14 +1,12 @@
 """`studio correct`, forwards and backwards."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command_line import answer_of, call, refusal_of
 from toy_session import true_poses
 
-from studio.cli.main import main
 from studio.sessions.named_rows import write_pose
 from studio.sessions.session import Session
 
@@ -19,19 +17,12 @@ def pose(session_on_disk: Session, tmp_path: Path) -> str:
     file = tmp_path / "pose.csv"
     write_pose(file, tuple(entry.name for entry in session_on_disk.body().parameters), true_poses()[4])
     words = ["track", "toy", "--particles", "20", "--layers", "3", "--name", "one", "--start-pose", str(file)]
-    printed = CliRunner().invoke(main, words)
-    assert printed.exit_code == 0, printed.output
+    call(*words)
     return str(file)
 
 
-def invoke(*words: str) -> dict[str, object]:
-    printed = CliRunner().invoke(main, ["correct", "toy", "one", *words, "--json"])
-    assert printed.exit_code == 0, printed.output
-    return json.loads(printed.stdout)
-
-
 def test_on_and_back(session_on_disk: Session, pose: str) -> None:
-    printed = invoke("--at", "4", "--pose", pose, "--name", "on")
+    printed = answer_of("correct toy one --at 4 --pose", pose, "--name", "on")
     assert (printed["run"], printed["made_from"], printed["corrected"], printed["frames"]) == (
         "on",
         "one",
@@ -39,7 +30,7 @@ def test_on_and_back(session_on_disk: Session, pose: str) -> None:
         4,
     )
     assert session_on_disk.run("on").summary().status == "finished"
-    printed = invoke("--at", "4", "--from-track", "raw", "--back-to", "1", "--name", "back")
+    printed = answer_of("correct toy one --at 4 --from-track raw --back-to 1 --name back")
     assert (printed["frames"], printed["back_to"]) == (4, 1)
     record = session_on_disk.run("back").record
     with session_on_disk.run("one").results() as results:
@@ -57,7 +48,5 @@ def test_on_and_back(session_on_disk: Session, pose: str) -> None:
     ],
 )
 def test_refusals(session_on_disk: Session, pose: str, words: list[str], cause: str) -> None:
-    printed = CliRunner().invoke(main, ["correct", "toy", "one", *words])
-    assert printed.exit_code == 2
-    assert cause in " ".join(printed.stderr.split())
+    assert cause in refusal_of("correct toy one", *words)
     assert len(session_on_disk.runs()) == 1

@@ -7,14 +7,13 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from command_line import answer_of
 from toy_session import make_session, true_poses
 from tracked_runs import finish
 
 from studio.app.server.access import new_token
 from studio.cli import diagnostics_archive
 from studio.cli.launch import _log_to_file, address
-from studio.cli.main import main
 from studio.cli.self_check import Examined
 from studio.foundations.errors import SessionError
 from studio.runs.new_run import prepare_run
@@ -70,11 +69,10 @@ def planted(home: Path) -> str:
 
 def test_it_holds_no_footage_no_names_and_no_secrets(home: Path, tmp_path: Path) -> None:
     token = planted(home)
-    done = CliRunner().invoke(main, ["diagnostics", "--out", str(tmp_path / "out.zip"), "--json"])
-    assert done.exit_code == 0, done.output
+    done = answer_of("diagnostics --out", tmp_path / "out.zip")
     with zipfile.ZipFile(tmp_path / "out.zip") as archive:
         texts = {name: archive.read(name).decode() for name in archive.namelist()}
-    assert [*texts] == json.loads(done.stdout)["parts"]
+    assert [*texts] == done["parts"]
     assert [*texts] == ["README.txt", "doctor.json", "environment.json", "sessions.json", "server.log"]
     stored = {
         path.name

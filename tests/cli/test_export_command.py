@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command_line import answer_of, call, refusal_of
 from store_records import layer_of, record_of, result_of
 
-from studio.cli.main import main
 from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
@@ -30,18 +29,12 @@ def run(session_on_disk: Session) -> str:
     return "first"
 
 
-def export(*words: str):
-    return CliRunner().invoke(main, ["export", "toy", "first", *words])
-
-
 @pytest.mark.parametrize(
     "ending", ["bvh", "glb", "trc", "mot", "c3d", "csv", "parquet", "npz", "mp4", "viser", "toml", "yml"]
 )
 def test_every_ending_is_written(run: str, tmp_path: Path, ending: str) -> None:
     place = tmp_path / f"arm.{ending}"
-    done = export("--to", str(place), "--json")
-    assert done.exit_code == 0, done.output
-    printed = json.loads(done.stdout)
+    printed = answer_of("export toy first --to", place)
     assert printed["files"] == [str(place)]
     assert printed["format"] == ending
     assert printed["frames"] == (0 if ending in ("toml", "yml") else FRAMES)
@@ -51,8 +44,9 @@ def test_every_ending_is_written(run: str, tmp_path: Path, ending: str) -> None:
 
 def test_options_reach_the_file(run: str, tmp_path: Path) -> None:
     place = tmp_path / "arm.trc"
-    done = export("--to", str(place), "--unit", "mm", "--track", "short", "--first", "1", "--fps", "120")
-    assert done.exit_code == 0, done.output
+    done = call(
+        "export toy first --to", place, "--unit", "mm", "--track", "short", "--first", "1", "--fps", "120"
+    )
     assert "read back within" in done.stdout
     header = dict(zip(*(line.split("\t") for line in place.read_text().splitlines()[1:3]), strict=True))
     assert (header["Units"], header["NumFrames"], header["DataRate"]) == ("mm", "3", "120")
@@ -74,18 +68,14 @@ def test_what_is_wrong_is_said_with_exit_code_2(
     run: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], cause: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = export(*words)
-    assert done.exit_code == 2
-    assert cause in done.stderr
-    assert done.stdout == ""
+    assert cause in refusal_of("export toy first", *words)
     assert list(tmp_path.glob("arm*")) == []
 
 
 def test_a_run_that_there_is_not(session_on_disk: Session, tmp_path: Path) -> None:
-    done = export("--to", str(tmp_path / "arm.bvh"))
-    assert done.exit_code == 2
-    assert "first" in done.stderr
-    assert "remedy" in done.stderr
+    done = refusal_of("export toy first --to", tmp_path / "arm.bvh")
+    assert "first" in done
+    assert "remedy" in done
 
 
 def test_the_best_track_is_written_unless_another_is_named_and_the_answer_says_which(
@@ -97,12 +87,11 @@ def test_the_best_track_is_written_unless_another_is_named_and_the_answer_says_w
     still = {"poses": np.zeros_like(raw.poses), "made_by": {"verb": "smooth", "from": "raw"}}
     write_track(stored, dataclasses.replace(raw, name="smoothed", **still))
     place = tmp_path / "arm.npz"
-    done = export("--to", str(place))
-    assert done.exit_code == 0, done.output
+    done = call("export toy first --to", place)
     assert "track 'smoothed'" in done.stdout
     with np.load(place) as arrays:
         assert not arrays["poses"].any()
-    named = json.loads(export("--to", str(place), "--track", "raw", "--json").stdout)
+    named = answer_of("export toy first --to", place, "--track", "raw")
     assert named["track"] == "raw"
     with np.load(place) as arrays:
         assert arrays["poses"].any()
@@ -114,6 +103,6 @@ def test_a_better_track_that_is_out_of_date_is_passed_over_and_named(
     stored = session_on_disk.run(run)
     short = dataclasses.replace(read_track(stored, "short"), name="smoothed")
     write_track(stored, short)
-    done = export("--to", str(tmp_path / "arm.trc"), "--json")
+    done = call("export toy first --to", tmp_path / "arm.trc", "--json")
     assert json.loads(done.stdout)["track"] == "raw"
     assert "'smoothed' was made before the run changed" in done.stderr

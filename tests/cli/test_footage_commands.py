@@ -1,16 +1,14 @@
 """`studio synchronise`, and `studio import` with offsets, turns and trials."""
 
-import json
 import shutil
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command_line import answer_of, call, refusal_of
 from toy_footage import rig, write_pictures, write_video
 
-from studio.cli.main import main
 from studio.footage.capture.calibration_files import export_calibration
 from studio.sessions.session import Session
 
@@ -54,33 +52,20 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "workspace"
 
 
-def printed(*words: str) -> dict:
-    result = CliRunner().invoke(main, [*words, "--json"])
-    assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout)
-
-
-def refused(*words: str) -> str:
-    result = CliRunner().invoke(main, list(words))
-    assert result.exit_code == 2, result.output
-    assert "remedy" in result.stderr
-    return " ".join(result.stderr.split())
-
-
 def test_an_estimate_is_shown_then_applied(footage: Path, workspace: Path) -> None:
-    assert printed("import", str(footage), "--into", "take")["layout"] == "folder in the studio's layout"
-    shown = printed("synchronise", "take", "--within", "0.5")
+    assert answer_of("import", footage, "--into", "take")["layout"] == "folder in the studio's layout"
+    shown = answer_of("synchronise take --within 0.5")
     assert shown["estimate"]["offsets"] == {"cam1": LATE, "cam2": 0}
     assert shown["estimate"]["sure"]
     assert shown["offsets"] == {"cam1": 0, "cam2": 0}
-    text = CliRunner().invoke(main, ["synchronise", "take", "--within", "0.5"])
+    text = call("synchronise take --within 0.5")
     assert "cam1: +6 frames, give or take" in text.stdout
     assert "Nothing was changed" in text.stderr
-    applied = printed("synchronise", "take", "--within", "0.5", "--apply")
+    applied = answer_of("synchronise take --within 0.5 --apply")
     assert applied["offsets"] == {"cam1": LATE, "cam2": 0}
     assert applied["frames"] == FRAMES - LATE
     # Once in step, the estimate is of the files, so it says the same again.
-    assert printed("synchronise", "take", "--within", "0.5")["estimate"]["offsets"] == {
+    assert answer_of("synchronise take --within 0.5")["estimate"]["offsets"] == {
         "cam1": LATE,
         "cam2": 0,
     }
@@ -89,32 +74,32 @@ def test_an_estimate_is_shown_then_applied(footage: Path, workspace: Path) -> No
 
 
 def test_offsets_and_turns_by_hand_and_back(footage: Path, workspace: Path) -> None:
-    printed("import", str(footage), "--into", "take", "--offset", "cam1=6")
+    answer_of("import", footage, "--into", "take", "--offset", "cam1=6")
     session = Session(workspace / "take")
     upright = session.footage().picture("cam2", 3)
-    changed = printed("synchronise", "take", "--offset", "cam2=2", "--rotate", "cam2=180")
+    changed = answer_of("synchronise take --offset cam2=2 --rotate cam2=180")
     assert changed["offsets"] == {"cam1": 4, "cam2": 0}
     assert changed["rotations"] == {"cam1": 0, "cam2": 180}
     turned = Session(workspace / "take").footage().picture("cam2", 3)
     np.testing.assert_array_equal(turned, cv2.rotate(upright, cv2.ROTATE_180))
-    printed("synchronise", "take", "--rotate", "cam2=0", "--offset", "cam1=6")
+    answer_of("synchronise take --rotate cam2=0 --offset cam1=6")
     np.testing.assert_array_equal(Session(workspace / "take").footage().picture("cam2", 3), upright)
 
 
 def test_recorded_times(footage: Path, workspace: Path, tmp_path: Path) -> None:
-    printed("import", str(footage), "--into", "take")
+    answer_of("import", footage, "--into", "take")
     rows = [f"{camera},{(late + k) / 60.0}" for camera, late in ((1, 0), (2, LATE)) for k in range(FRAMES)]
     path = tmp_path / "timestamps.csv"
     path.write_text("\n".join(["cam_id,frame_time", *rows]))
-    shown = printed("synchronise", "take", "--timestamps", str(path))
+    shown = answer_of("synchronise take --timestamps", path)
     assert shown["recorded"]["offsets"] == {"cam1": LATE, "cam2": 0}
     assert shown["offsets"] == {"cam1": 0, "cam2": 0}
-    assert printed("synchronise", "take", "--timestamps", str(path), "--apply")["offsets"] == {
+    assert answer_of("synchronise take --timestamps", path, "--apply")["offsets"] == {
         "cam1": LATE,
         "cam2": 0,
     }
     path.write_text("\n".join(["cam_id,frame_time", *rows[:FRAMES]]))
-    assert "times of 1 of the 2 cameras" in refused("synchronise", "take", "--timestamps", str(path))
+    assert "times of 1 of the 2 cameras" in refusal_of("synchronise take --timestamps", path)
 
 
 def test_an_estimate_that_is_not_reliable_is_not_applied(tmp_path: Path, workspace: Path) -> None:
@@ -125,19 +110,19 @@ def test_an_estimate_that_is_not_reliable_is_not_applied(tmp_path: Path, workspa
         write_pictures(source / "pictures" / f"cam{view + 1}", frames)
     (source / "calibration").mkdir()
     export_calibration(rig(2), source / "calibration" / "Calib.toml", "pose2sim")
-    printed("import", str(source), "--into", "noise", "--fps", "60")
-    assert "not reliable" in refused("synchronise", "noise", "--apply")
+    answer_of("import", source, "--into", "noise", "--fps", "60")
+    assert "not reliable" in refusal_of("synchronise noise --apply")
     assert Session(workspace / "noise").manifest.footage.cameras[0].offset == 0
 
 
 def test_one_of_several_trials(footage: Path, workspace: Path, tmp_path: Path) -> None:
     for name in ("Trial_1", "Trial_2"):
         shutil.copytree(footage, tmp_path / "batch" / name)
-    said = refused("import", str(tmp_path / "batch"), "--into", "one")
+    said = refusal_of("import", tmp_path / "batch", "--into", "one")
     assert "2 trials: Trial_1, Trial_2" in said
     assert "--trial Trial_1" in said
     shutil.rmtree(tmp_path / "batch" / "Trial_1" / "calibration")
-    printed("import", str(tmp_path / "batch"), "--into", "one", "--trial", "Trial_2")
+    answer_of("import", tmp_path / "batch", "--into", "one", "--trial", "Trial_2")
     assert Session(workspace / "one").manifest.imported_from.endswith("Trial_2")
 
 
@@ -154,5 +139,5 @@ def test_one_of_several_trials(footage: Path, workspace: Path, tmp_path: Path) -
     ],
 )
 def test_refusals(footage: Path, workspace: Path, words: list[str], cause: str) -> None:
-    printed("import", str(footage), "--into", "take", "--reference")
-    assert cause in refused("synchronise", "take", *words)
+    answer_of("import", footage, "--into", "take", "--reference")
+    assert cause in refusal_of("synchronise take", *words)

@@ -6,20 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arm_behaviour import FPS, keep_arm_model
-from click.testing import CliRunner, Result
+from command_line import call, refusal_of
 from toy_session import FRAMES, true_poses
 
 from studio.body.forward_kinematics import marker_points
 from studio.body.motion_files.trc import MarkerMotion, write_trc
-from studio.cli.main import main
 from studio.results.comparison.kept_comparison import BEHAVIOUR_NAME
 from studio.sessions.named_rows import write_pose
 from studio.sessions.provenance import note
 from studio.sessions.session import Session
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
 
 
 @pytest.fixture
@@ -41,26 +36,22 @@ def started(session_on_disk: Session) -> Session:
 def test_track_with_a_model(started: Session, tmp_path: Path) -> None:
     path = keep_arm_model(started.path.parent)
     common = ("track", "toy", "--frames", "0:2", "--particles", "40", "--json")
-    only = run(*common, "--tracker", "behaviour")
-    assert only.exit_code == 0, only.stderr
+    only = call(*common, "--tracker", "behaviour")
     assert json.loads(only.stdout)["behaviour"] == "swings"
     assert "the only one" in only.stderr
-    named = run(*common, "--tracker", "behaviour", "--behaviour", "swings", "--set", "attenuation=0.2")
+    named = call(*common, "--tracker", "behaviour", "--behaviour", "swings", "--set", "attenuation=0.2")
     assert json.loads(named.stdout)["behaviour"] == "swings"
-    predicted = run(*common, "--behaviour", str(path), "--set", "prediction=behaviour", "--layers", "2")
+    predicted = call(*common, "--behaviour", path, "--set", "prediction=behaviour", "--layers", "2")
     assert json.loads(predicted.stdout)["behaviour"] == "swings"
-    assert "behaviour" not in json.loads(run(*common, "--layers", "2").stdout)
+    assert "behaviour" not in json.loads(call(*common, "--layers", "2").stdout)
 
 
 def test_track_without_a_model_says_how_to_get_one(started: Session) -> None:
     for request in (("--tracker", "behaviour"), ("--set", "prediction=behaviour")):
-        result = run("track", "toy", *request)
-        assert result.exit_code == 2
-        assert "none of body 'planar_arm4'" in result.stderr
-        assert "studio learn" in result.stderr
-    result = run("track", "toy", "--tracker", "behaviour", "--behaviour", "nobody")
-    assert result.exit_code == 2
-    assert "no behaviour model 'nobody'" in result.stderr
+        result = refusal_of("track toy", *request)
+        assert "none of body 'planar_arm4'" in result
+        assert "studio learn" in result
+    assert "no behaviour model 'nobody'" in refusal_of("track toy --tracker behaviour --behaviour nobody")
 
 
 @pytest.mark.slow
@@ -70,8 +61,7 @@ def test_compare_with_a_model(started: Session) -> None:
         "compare", "toy", "--trackers", "behaviour,annealed:guided,condensation", "--evaluations", "40",
         "--layers", "2", "--seeds", "1", "--frames", "0:3", "--processes", "1", "--json",
     )  # fmt: skip
-    result = run(*common)
-    assert result.exit_code == 0, result.stderr
+    result = call(*common)
     printed = json.loads(result.stdout)
     assert [entry["tracker"] for entry in printed["trackers"]] == [
         "behaviour",
@@ -80,13 +70,11 @@ def test_compare_with_a_model(started: Session) -> None:
     ]
     assert (Path(printed["folder"]) / BEHAVIOUR_NAME).read_bytes() == path.read_bytes()
     path.unlink()
-    refused = run(*common)
-    assert refused.exit_code == 2
-    assert "needs a behaviour model" in refused.stderr
+    assert "needs a behaviour model" in refusal_of(*common)
     # Nobody who takes part by default needs one.
     assert (
         "behaviour"
-        not in run("compare", "--help").output.partition("--evaluations")[0].partition("default:")[2]
+        not in call("compare --help").output.partition("--evaluations")[0].partition("default:")[2]
     )
 
 
@@ -94,10 +82,7 @@ def test_track_despite_what_the_footage_says(started: Session) -> None:
     doubt = "Camera cam2 seems to be mirrored. Record it again."
     note(started, "background", "in doubt", good=False, stops=(doubt,))
     common = ("track", "toy", "--frames", "0:1", "--particles", "20", "--layers", "2", "--json")
-    refused = run(*common)
-    assert refused.exit_code == 2
-    assert doubt in refused.stderr
+    assert doubt in refusal_of(*common)
     assert not started.runs()
-    tracked = run(*common, "--allow-inconsistent")
-    assert tracked.exit_code == 0, tracked.stderr
+    tracked = call(*common, "--allow-inconsistent")
     assert f"Tracked despite: {doubt}" in tracked.stderr

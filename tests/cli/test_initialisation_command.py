@@ -1,33 +1,25 @@
 """`studio initialise`, and what `studio track` says of runs that were lost."""
 
-import json
-
 import pytest
-from click.testing import CliRunner
+from command_line import answer_of, call, refusal_of
 
-from studio.cli.main import main
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
 
 @pytest.mark.slow
 def test_a_start_pose_is_written_and_then_kept(session_on_disk: Session) -> None:
-    runner = CliRunner()
-    first = runner.invoke(main, ["initialise", "toy", "--json"])
-    assert first.exit_code == 0, first.output
-    printed = json.loads(first.stdout)
+    printed = answer_of("initialise toy")
     assert (printed["session"], printed["frame"], printed["body"]) == ("toy", 0, "planar_arm4")
     assert printed["confidence"] > 0.8
     assert set(printed["pose"]) == {entry.name for entry in session_on_disk.body().parameters}
     stored = session_on_disk.start_pose()
     assert stored is not None
     assert stored.tolist() == pytest.approx(list(printed["pose"].values()))
-    second = runner.invoke(main, ["initialise", "toy", "--frame", "3", "--seed", "1"])
-    assert second.exit_code == 0, second.output
+    second = call("initialise toy --frame 3 --seed 1")
     assert "start_pose-frame-3.csv" in second.stdout
     assert "confidence" in second.stdout
-    third = runner.invoke(main, ["initialise", "toy", "--replace", "--json"])
-    assert json.loads(third.stdout)["file"].endswith("start_pose.csv")
+    assert answer_of("initialise toy --replace")["file"].endswith("start_pose.csv")
     assert (session_on_disk.path / "start_pose-before.csv").is_file()
 
 
@@ -40,14 +32,11 @@ def test_a_start_pose_is_written_and_then_kept(session_on_disk: Session) -> None
     ],
 )
 def test_refusals(session_on_disk: Session, words: list[str], cause: str) -> None:
-    printed = CliRunner().invoke(main, ["initialise", "toy", *words])
-    assert printed.exit_code == 2
-    assert cause in " ".join(printed.stderr.split())
+    assert cause in refusal_of("initialise toy", *words)
     assert not (session_on_disk.path / "start_pose.csv").exists()
 
 
 def test_track_tells_how_it_went(session_on_disk: Session) -> None:
-    words = ["track", "toy", "--frames", ":2", "--particles", "30", "--layers", "3", "--json"]
-    printed = json.loads(CliRunner().invoke(main, words).stdout)
+    printed = answer_of("track toy --frames :2 --particles 30 --layers 3")
     assert printed["frames_lost"] + printed["frames_without_evidence"] + printed["times_recovered"] <= 2
     assert len(Workspace().session("toy").runs()) == 1

@@ -3,19 +3,14 @@
 import json
 
 import pytest
-from click.testing import CliRunner, Result
+from command_line import answer_of, call, refusal_of
 from toy_session import FRAMES, true_poses
 
-from studio.cli.main import main
 from studio.garden.benchmarks.live_stages import in_words, stage_rows
 from studio.sessions.named_rows import write_pose
 from studio.sessions.session import Session
 
 QUICK = ("--tracker", "annealed", "--weighting", "edge-region", "--particles", "30", "--layers", "2")
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
 
 
 @pytest.fixture
@@ -27,8 +22,7 @@ def started(session_on_disk: Session) -> Session:
 
 
 def test_a_live_run_and_its_replay(started: Session) -> None:
-    result = run("live", "toy", *QUICK, "--seconds", "0.5", "--repeat", "--json", "--name", "now")
-    assert result.exit_code == 0, result.stderr
+    result = call("live toy", *QUICK, "--seconds", "0.5", "--repeat", "--json", "--name", "now")
     printed = json.loads(result.stdout)
     assert printed["run"] == "now"
     assert printed["frames"] + len(printed["dropped"]) == 30
@@ -36,18 +30,17 @@ def test_a_live_run_and_its_replay(started: Session) -> None:
     latency = printed["latency_ms"]
     assert 0.0 < latency["median"] <= latency["p95"] <= latency["worst"]
     assert started.run("now").record.ping_pong
-    again = json.loads(run("live", "toy", "--replay", "now", "--json").stdout)
+    again = answer_of("live toy --replay now")
     assert (again["frames"], again["different"]) == (printed["frames"], [])
 
 
 def test_words_for_a_person(started: Session) -> None:
-    result = run("live", "toy", *QUICK, "--from", "2")
-    assert result.exit_code == 0, result.stderr
+    result = call("live toy", *QUICK, "--from", "2")
     assert "frames tracked" in result.stdout
     assert "picture to pose" in result.stdout
     assert started.runs()[-1].record.first == 2
     assert started.runs()[-1].record.last == FRAMES
-    assert "bit for bit" in run("live", "toy", "--replay", started.runs()[-1].name).stdout
+    assert "bit for bit" in call("live toy --replay", started.runs()[-1].name).stdout
 
 
 @pytest.mark.parametrize(
@@ -62,9 +55,7 @@ def test_words_for_a_person(started: Session) -> None:
     ],
 )
 def test_refusals(started: Session, sent: tuple[str, ...], cause: str) -> None:
-    result = run("live", "toy", *QUICK, *sent)
-    assert result.exit_code == 2
-    assert cause in result.stderr
+    assert cause in refusal_of("live toy", *QUICK, *sent)
     assert not started.runs()
 
 

@@ -5,11 +5,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from command_line import answer_of, call, refusal_of
 from toy_experiments import toy
 
 from studio.cli import reproduction_commands
-from studio.cli.main import main
 from studio.garden.reproduction import catalogue
 from studio.garden.reproduction import runner as reproduction
 from studio.sessions.workspace import workspace_root
@@ -27,23 +26,18 @@ def _toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(main, ["reproduce", *arguments], catch_exceptions=False)
-
-
 @pytest.mark.slow
 def test_a_stranger_sees_what_there_is_and_what_was_found(tmp_path: Path) -> None:
-    assert "toy-good  (not run yet)" in run("list").stdout
-    found = run("toy-good", "--seeds", "2", "--processes", "1")
-    assert found.exit_code == 0
+    assert "toy-good  (not run yet)" in call("reproduce list").stdout
+    found = call("reproduce toy-good --seeds 2 --processes 1")
     assert "toy-good: reproduced, not firm" in found.stdout
     assert "error, plain: 40." in found.stdout
     assert "4 trials run, 0 kept from before, 0 failed." in found.stdout
     report = workspace_root() / "reproduction" / "report.html"
     assert f"Report: {report}" in found.stdout
     assert report.is_file()
-    assert "toy-good  (reproduced, not firm)" in run("list").stdout
-    listed = json.loads(run("list", "--json").stdout)["experiments"]
+    assert "toy-good  (reproduced, not firm)" in call("reproduce list").stdout
+    listed = answer_of("reproduce list")["experiments"]
     assert [(line["name"], line["verdict"]) for line in listed] == [
         ("toy-good", "reproduced"),
         ("toy-bad", None),
@@ -52,10 +46,7 @@ def test_a_stranger_sees_what_there_is_and_what_was_found(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_json_is_one_object_and_failures_have_an_exit_code(tmp_path: Path) -> None:
-    found = run(
-        "all", "--quick", "--seeds", "1", "--processes", "1", "--out", str(tmp_path / "here"), "--json"
-    )
-    assert found.exit_code == 1
+    found = call("reproduce all --quick --seeds 1 --processes 1 --out", tmp_path / "here", "--json", code=1)
     printed = json.loads(found.stdout)
     assert printed["out"] == str(tmp_path / "here")
     assert printed["trials"] == {"measured": 2, "kept": 0, "failed": 2}
@@ -64,13 +55,12 @@ def test_json_is_one_object_and_failures_have_an_exit_code(tmp_path: Path) -> No
 
 
 def test_wrong_calls_are_reported_a_remedy(tmp_path: Path) -> None:
-    found = run("toy-goof")
-    assert found.exit_code == 2
-    assert "There is no experiment 'toy-goof'." in found.stderr
-    assert "Did you mean toy-good" in found.stderr
-    assert run("toy-good", "--seeds", "0").exit_code == 2
+    found = refusal_of("reproduce toy-goof")
+    assert "There is no experiment 'toy-goof'." in found
+    assert "Did you mean toy-good" in found
+    refusal_of("reproduce toy-good --seeds 0")
     (tmp_path / "file").write_text("")
-    assert run("toy-good", "--out", str(tmp_path / "file")).exit_code == 2
+    refusal_of("reproduce toy-good --out", tmp_path / "file")
 
 
 def test_after_ctrl_c_it_is_said_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,8 +69,7 @@ def test_after_ctrl_c_it_is_said_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(reproduction, "run_jobs", interrupted)
     monkeypatch.setattr(sys, "argv", ["studio", "reproduce", "toy-good", "--seeds", "2"])
-    found = run("toy-good", "--seeds", "2")
-    assert found.exit_code == 130
+    found = call("reproduce toy-good --seeds 2", code=130)
     assert "Go on with: studio reproduce toy-good --seeds 2" in found.stderr
     assert (workspace_root() / "reproduction" / "report.html").is_file()
 
@@ -93,12 +82,10 @@ def test_findings_go_into_the_guide_with_commits_that_exist(
     monkeypatch.setattr(reproduction_commands, "guide_folder", lambda: guide)
     monkeypatch.setattr(reproduction, "commit", lambda: "0123456789ab with changes")
     wanted = ("toy-good", "--seeds", "2", "--processes", "1", "--into-guide")
-    refused = run(*wanted)
-    assert refused.exit_code == 2
-    assert "cite no commit that exists" in refused.stderr
+    assert "cite no commit that exists" in refusal_of("reproduce", *wanted)
     assert not guide.exists()
     monkeypatch.setattr(reproduction, "commit", lambda: "0123456789ab")
-    assert run(*wanted, "--out", str(tmp_path / "anew")).exit_code == 0
+    call("reproduce", *wanted, "--out", tmp_path / "anew")
     written = json.loads((guide / "toy-good.json").read_text())
     assert written["commits"] == ["0123456789ab"]
     assert written["verdict"] == "reproduced"

@@ -1,17 +1,10 @@
 """`studio subjects`, `studio together`, `studio background --subject-at`."""
 
-import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from command_line import answer_of, call, refusal_of
 from two_people import TwoPeople, two_people
-
-from studio.cli.main import main
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
 
 
 @pytest.fixture
@@ -21,30 +14,23 @@ def people(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> TwoPeople:
 
 
 def test_who_is_in_view_is_listed_and_each_gets_a_session(people: TwoPeople) -> None:
-    seen = json.loads(run("subjects", "two", "--json").stdout)["seen"]
+    seen = answer_of("subjects two")["seen"]
     assert len(seen) == 2
     places = [f"{x},{y}" for x, y in people.places()]
-    made = run(
-        "subjects", "two", "--at", places[0], "--at", places[1], "--into", "ann", "--into", "bob", "--json"
-    )
-    assert made.exit_code == 0, made.stderr
-    assert json.loads(made.stdout)["sessions"] == ["ann", "bob"]
-    again = run("subjects", "two", "--at", places[0], "--into", "ann")
-    assert again.exit_code == 2
-    assert "ann" in again.stderr
-    done = run("together", "ann", "--beside", "bob", "--json")
-    assert done.exit_code == 0, done.stderr
-    assert json.loads(done.stdout)["bodies"] == 2
+    made = answer_of("subjects two --at", places[0], "--at", places[1], "--into", "ann", "--into", "bob")
+    assert made["sessions"] == ["ann", "bob"]
+    assert "ann" in refusal_of("subjects two --at", places[0], "--into", "ann")
+    done = answer_of("together ann --beside bob")
+    assert done["bodies"] == 2
 
 
 @pytest.mark.slow
 def test_masks_of_several_are_said_to_be_so_and_cut(people: TwoPeople) -> None:
-    said = run("background", "two")
+    said = call("background two")
     assert "2 subjects are in view" in said.stdout
     x, y = people.places()[0]
-    cut = run("background", "two", "--subject-at", f"{x},{y}", "--json")
-    assert cut.exit_code == 0, cut.stderr
-    assert json.loads(cut.stdout)["subjects"] == 1
+    cut = answer_of("background two --subject-at", f"{x},{y}")
+    assert cut["subjects"] == 1
 
 
 @pytest.mark.parametrize(
@@ -61,6 +47,4 @@ def test_masks_of_several_are_said_to_be_so_and_cut(people: TwoPeople) -> None:
     ],
 )
 def test_what_cannot_be_is_said(people: TwoPeople, arguments: tuple[str, ...], words: str) -> None:
-    refused = run(*arguments)
-    assert refused.exit_code == 2
-    assert words in refused.stderr
+    assert words in refusal_of(*arguments)

@@ -2,6 +2,7 @@
 
 import ast
 import functools
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -32,13 +33,19 @@ class Room:
         nearest first. whole : all that reach it.
         """
         wanted = self._root / source
-        near = {wanted: 0}
-        waiting = [wanted]
-        for at in waiting:
+        near: dict[Path, int] = {}
+        waiting = deque([(wanted, 0)])
+        while waiting:
+            at, steps = waiting.popleft()
+            if at in near:
+                continue
+            near[at] = steps
             for user in self._users.get(at, ()):
-                if user not in near:
-                    near[user] = near[at] + 1
-                    waiting.append(user)
+                # A builder of tests is a part of the test.
+                if at in self._helpers:
+                    waiting.appendleft((user, steps))
+                else:
+                    waiting.append((user, steps + 1))
         own = f"test_{wanted.name}"
         found = [file for file in self._tests if file in near or file.name == own]
         least = min((near[file] for file in found if file in near), default=0)

@@ -47,6 +47,8 @@ def checkout(tmp_path: Path) -> Path:
         "toy/room/one.py": SOURCE,
         "toy/room/two.py": "from toy.room.one import LIMIT\n\nTWICE = 2 * LIMIT\n",
         "tests/room/test_one.py": TEST,
+        "tests/room/built.py": "from toy.room.one import seen\n\nMADE = seen()\n",
+        "tests/room/test_made.py": "from built import MADE\n\n\ndef test_made():\n    assert MADE\n",
         "tests/room/test_both.py": "from toy.room.two import TWICE\n\n\ndef test_twice():\n    assert TWICE\n",
     }.items():
         file = tmp_path / "checkout" / path
@@ -104,11 +106,9 @@ def test_changes_are_one_at_a_time_and_can_be_read() -> None:
 
 def test_a_change_is_shown_to_the_tests_that_import_its_file(checkout: Path) -> None:
     room = Room(checkout, "room", "toy")
-    assert room.tests_of("toy/room/one.py") == ["tests/room/test_one.py"]
-    assert room.tests_of("toy/room/one.py", whole=True) == [
-        "tests/room/test_one.py",
-        "tests/room/test_both.py",
-    ]
+    nearest = ["tests/room/test_one.py", "tests/room/test_made.py"]
+    assert room.tests_of("toy/room/one.py") == nearest
+    assert room.tests_of("toy/room/one.py", whole=True) == [*nearest, "tests/room/test_both.py"]
     assert room.tests_of("toy/room/two.py") == ["tests/room/test_both.py"]
 
 

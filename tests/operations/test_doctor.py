@@ -13,10 +13,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command_line import call
 
 from studio.cli import self_check as examination
-from studio.cli.main import main
 from studio.cli.self_check import Examined, doctor
 from studio.foundations.errors import RunError
 from studio.search.likelihood.edge_region import DEVICE_MODULE, EdgeRegionFrameLikelihood
@@ -192,8 +191,7 @@ def test_the_command_ends_with_1_where_something_is_wrong(
 ) -> None:
     monkeypatch.setenv("STUDIO_WORKSPACE", str(tmp_path / "workspace"))
     monkeypatch.setattr(examination, "_tracked", lambda: "not tried")
-    assert CliRunner().invoke(main, ["doctor"]).exit_code == 0
+    call("doctor")
     full_disk(monkeypatch, tmp_path)
-    done = CliRunner().invoke(main, ["doctor", "--json"])
-    assert done.exit_code == 1
+    done = call("doctor --json", code=1)
     assert [one["name"] for one in json.loads(done.stdout)["checks"] if not one["good"]] == ["disk"]

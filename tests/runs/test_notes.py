@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from click.testing import CliRunner
+from command_line import answer_of, call
 from tracked_runs import finish
 
 import studio
-from studio.cli.main import main
 from studio.foundations.errors import NotFoundError, SessionError, SettingsError
 from studio.results.inspection.reading import InspectedRun
 from studio.results.inspection.shared_page import shared_page
@@ -70,11 +69,10 @@ def test_notes_are_exported(run: StoredRun, session_on_disk: Session, tmp_path: 
 
 
 def test_the_command_line_writes_them(run: StoredRun) -> None:
-    name, runner = (run.session_name, run.name), CliRunner()
-    written = runner.invoke(main, ["note", *name, "--frame", "1", "--text", "look here"])
-    assert written.exit_code == 0, written.output
+    name = (run.session_name, run.name)
+    written = call("note", *name, "--frame", "1", "--text", "look here")
     assert "frame 1: look here" in written.output
-    listed = runner.invoke(main, ["notes", *name, "--json"])
-    assert json.loads(listed.output)["notes"][0]["text"] == "look here"
-    assert runner.invoke(main, ["note", *name, "--frame", "1", "--remove"]).exit_code == 0
+    listed = answer_of("notes", *name)
+    assert listed["notes"][0]["text"] == "look here"
+    call("note", *name, "--frame", "1", "--remove")
     assert studio.notes(run) == ()

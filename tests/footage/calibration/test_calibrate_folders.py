@@ -8,9 +8,8 @@ import msgspec
 import numpy as np
 import pytest
 from board_takes import BOARD, FLOOR_PLACE, render_takes, two_cameras
-from click.testing import CliRunner
+from command_line import answer_of, call, refusal_of
 
-from studio.cli.main import main
 from studio.footage.calibration.boards import Board
 from studio.footage.calibration.detection import BoardFinder
 from studio.footage.calibration.verbs import _other_spellings, calibrate
@@ -65,10 +64,8 @@ def test_a_person_can_stop_it(footage: Path) -> None:
 
 def test_the_command_writes_calibration_report_and_pictures(footage: Path, tmp_path: Path) -> None:
     target = tmp_path / "rig.toml"
-    words = ["calibrate", str(footage), "--board", BOARD.text, "--to", str(target), "--json"]
-    result = CliRunner().invoke(main, words)
-    assert result.exit_code == 0, result.output
-    report = msgspec.json.decode(result.stdout)
+    words = ["calibrate", footage, "--board", BOARD.text, "--to"]
+    report = answer_of(*words, target)
     assert report["usable"] is True
     assert "no-floor" in {finding["code"] for finding in report["findings"]}
     cameras = read_calibration(target).cameras
@@ -80,33 +77,16 @@ def test_the_command_writes_calibration_report_and_pictures(footage: Path, tmp_p
         picture = cv2.imread(str(tmp_path / f"rig.coverage-{name}.png"))
         assert picture is not None
         assert picture.std() > 10.0
-    again = CliRunner().invoke(main, words)
-    assert again.exit_code == 2
-    measured = CliRunner().invoke(
-        main,
-        [
-            *words[:-2],
-            str(tmp_path / "b.toml"),
-            "--distance",
-            f"{cameras[0].name},{cameras[1].name}=1500",
-            "--json",
-        ],
-    )
-    assert measured.exit_code == 2
+    refusal_of(*words, target)
+    refusal_of(*words, tmp_path / "b.toml", "--distance", f"{cameras[0].name},{cameras[1].name}=1500")
     assert not (tmp_path / "b.toml").exists()
     assert (tmp_path / "b.report.json").exists()
 
 
 @pytest.mark.slow
 def test_the_intrinsics_alone_give_lenses(footage: Path, tmp_path: Path) -> None:
-    result = CliRunner().invoke(
-        main,
-        [
-            "calibrate", str(footage), "--board", BOARD.text, "--intrinsics", str(footage / "intrinsics"),
-            "--to", str(tmp_path / "rig.toml"),
-        ],
-    )  # fmt: skip
-    assert result.exit_code == 0, result.output
+    lenses = ("--intrinsics", footage / "intrinsics", "--to", tmp_path / "rig.toml")
+    call("calibrate", footage, "--board", BOARD.text, *lenses)
     assert (tmp_path / "rig.lenses.toml").exists()
     assert not (tmp_path / "rig.toml").exists()
     placed = calibrate(
@@ -151,17 +131,15 @@ def test_a_mirrored_video_blocks(footage: Path, tmp_path: Path) -> None:
 )
 def test_refusals_have_remedies(footage: Path, words: list[str], message: str) -> None:
     words = [str(footage / word) if word == "extrinsics" else word for word in words]
-    result = CliRunner().invoke(main, ["calibrate", str(footage), *words])
-    assert result.exit_code == 2
-    assert message in " ".join(result.stderr.split())
-    assert "remedy" in result.stderr
+    result = refusal_of("calibrate", footage, *words)
+    assert message in result
+    assert "remedy" in result
 
 
 def test_the_board_command(tmp_path: Path) -> None:
     place = tmp_path / "board.pdf"
-    result = CliRunner().invoke(main, ["board", "--kind", "chessboard", "--to", str(place), "--json"])
-    assert result.exit_code == 0, result.output
-    assert msgspec.json.decode(result.stdout)["board"].startswith("chessboard:9x6,")
+    result = answer_of("board --kind chessboard --to", place)
+    assert result["board"].startswith("chessboard:9x6,")
     assert place.read_bytes().startswith(b"%PDF")
 
 
