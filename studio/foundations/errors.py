@@ -60,6 +60,10 @@ class TruthError(StudioError, status=422, code="truth"):
     """A TRC or other reference motion that cannot be used."""
 
 
+class NoPointsError(TruthError):
+    """A table that has no points: something else, such as a robot's angles."""
+
+
 class RunError(StudioError, status=409, code="run"):
     """A run that cannot start or continue."""
 

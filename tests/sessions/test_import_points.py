@@ -115,3 +115,13 @@ def test_times_of_points_count_by_the_footages_own_rate(tmp_path: Path) -> None:
     (source / "truth" / "points.csv").write_text("\n".join(["time,point,x_mm,y_mm,z_mm", *rows]) + "\n")
     session = import_source(source, tmp_path / "made", ImportOptions(fps=60.0)).session
     np.testing.assert_allclose(truth_of(session), points, atol=0.1)
+
+
+def test_a_table_of_angles_beside_the_points_is_left_out(tmp_path: Path) -> None:
+    source = video_source(tmp_path / "source")
+    points = seen_points(rig(2, "cam_"))
+    write_points(source / "truth" / "points.csv", points)
+    (source / "truth" / "joint_angles.csv").write_text("frame,A1_rad,A2_rad\n0,0.1,0.2\n")
+    session = import_source(source, tmp_path / "made").session
+    np.testing.assert_allclose(truth_of(session), points, atol=0.1)
+    assert any("joint_angles.csv' was left out" in note for note in session.manifest.notes)

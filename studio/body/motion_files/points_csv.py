@@ -30,7 +30,7 @@ from studio.body.motion_files.trc import (
     number_or_nan,
     without_zeros,
 )
-from studio.foundations.errors import TruthError
+from studio.foundations.errors import NoPointsError, TruthError
 from studio.foundations.foreign_files import foreign_file, read_foreign_text
 
 FRAME = ("frame", "frames", "frame_number", "fnum", "frame_index", "sync_index")
@@ -159,7 +159,7 @@ def _columns(path: Path, header: Sequence[str]) -> _Columns:
         if not owner if point >= 0 else owner:
             by_owner.setdefault(owner, {})[axis] = column, unit
     if not by_owner:
-        raise TruthError(f"'{path.name}' has no columns of coordinates.", SHAPE)
+        raise NoPointsError(f"'{path.name}' has no columns of coordinates.", SHAPE)
     for owner, axes in by_owner.items():
         if len(axes) != 3:
             lacking = ", ".join(axis for axis in "xyz" if axis not in axes)

@@ -24,7 +24,7 @@ from studio.footage.capture.calibration_files import (
 from studio.footage.capture.calibration_toml import is_canonical
 from studio.footage.capture.footage_source import CameraSource, FootageSource
 from studio.footage.capture.pictures import list_pictures
-from studio.foundations.errors import SessionError, StudioError
+from studio.foundations.errors import NoPointsError, SessionError, StudioError
 from studio.foundations.progress import Progress
 from studio.sessions.atomic_files import write_text
 from studio.sessions.importers.mask_forms import write_meant_masks
@@ -136,7 +136,11 @@ def carried_truth(
         beside = find_calibrations(path.parent)
         place = beside[0] if beside else plan.calibration
         own = read_calibration(place) if beside else read_calibration(place, unit)
-        motion = read_truth(path, fps, frame_count)
+        try:
+            motion = read_truth(path, fps, frame_count)
+        except NoPointsError as problem:
+            notes.append(f"'truth/{path.name}' was left out: {problem}")
+            continue
         if not motion.unit and own.mm > 1.0 and _spread(motion) < MOST_METRES:
             motion = _in_unit_of(own, motion, place.name)
         notes += motion.notes
