@@ -8,18 +8,16 @@ import contextlib
 import importlib
 import os
 import pickle
-import queue
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, BinaryIO, ParamSpec, TypeVar
+from typing import TypeVar
 
+from studio.foundations.children import Child, EndedError, SilentError, serve_tasks
 from studio.foundations.errors import StudioError
+from studio.foundations.progress import report
 
-P = ParamSpec("P")
 Result = TypeVar("Result")
 OnFrame = Callable[[int, int], None]
 
@@ -28,7 +26,6 @@ SECONDS_OF_SILENCE = 30.0
 MEMORY_BYTES = 8 << 30
 IDLE_SECONDS = 20.0
 REMEDY = "The file is damaged, or made to do harm: copy or export it again."
-COMMAND = "from studio.foundations.isolated import serve; serve()"
 INSIDE = "STUDIO_ISOLATED"
 
 
@@ -46,29 +43,27 @@ def isolated(
     """
     if os.environ.get(INSIDE):
         return function(path, *([] if on_frame is None else [on_frame]), **options)
-    child = _CHILDREN.take()
+    child, is_free = _CHILDREN.take(), False
+    task = (function.__module__, function.__qualname__, path, on_frame is not None, options)
     try:
-        child.send((function.__module__, function.__qualname__, path, on_frame is not None, options))
-        while True:
-            kind, value = child.hear(SECONDS_OF_SILENCE)
-            if kind == "frame" and on_frame is not None:
-                on_frame(*value)
-            elif kind == "result":
-                _CHILDREN.give_back(child)
-                return value
-            elif kind == "raised":
-                _CHILDREN.give_back(child)
-                if isinstance(value, StudioError):
-                    raise value
-                reason = " ".join(str(value).split())[:200] or type(value).__name__
-                raise wrong(f"'{path.name}' cannot be read ({reason}).", REMEDY)
-    except _Ended as ended:
-        child.kill()
-        raise wrong(f"'{path.name}' cannot be read: its reader {ended}.", REMEDY) from None
-    except BaseException:
-        if child.busy:
-            child.kill()
-        raise
+        kind, value = child.answer(pickle.dumps((_read, task, {})), on_frame or silent, SECONDS_OF_SILENCE)
+        is_free = True
+    except EndedError:
+        raise wrong(f"'{path.name}' cannot be read: its reader crashed.", REMEDY) from None
+    except SilentError:
+        patience = f"{SECONDS_OF_SILENCE:g} s"
+        raise wrong(f"'{path.name}' cannot be read: its reader took more than {patience}.", REMEDY) from None
+    finally:
+        if is_free:
+            _CHILDREN.give_back(child)
+        else:
+            child.end()
+    if kind == "returned":
+        return value
+    if isinstance(value, StudioError):
+        raise value
+    reason = " ".join(str(value).split())[:200] or type(value).__name__
+    raise wrong(f"'{path.name}' cannot be read ({reason}).", REMEDY)
 
 
 def silent(done: int, total: int) -> None:
@@ -76,91 +71,26 @@ def silent(done: int, total: int) -> None:
     return
 
 
-class _Ended(Exception):
-    """How the process ended, or that it does not answer, as text."""
-
-
-class _Child:
-    """The process from outside."""
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", COMMAND],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env={
-                **os.environ,
-                INSIDE: "1",
-                "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-                "OPENBLAS_NUM_THREADS": "1",
-            },
-        )
-        self.busy = False
-        self._heard: queue.SimpleQueue[tuple[str, Any] | None] = queue.SimpleQueue()
-        threading.Thread(target=self._listen, name="isolated reader", daemon=True).start()
-
-    @property
-    def lives(self) -> bool:
-        return self._process.poll() is None
-
-    def send(self, question: object) -> None:
-        assert self._process.stdin is not None
-        self.busy = True
-        try:
-            pickle.dump(question, self._process.stdin)
-            self._process.stdin.flush()
-        except OSError:
-            raise _Ended("crashed") from None
-
-    def hear(self, patience: float) -> tuple[str, Any]:
-        try:
-            reply = self._heard.get(timeout=patience)
-        except queue.Empty:
-            raise _Ended(f"took more than {patience:g} s") from None
-        if reply is None:
-            raise _Ended("crashed")
-        self.busy = reply[0] == "frame"
-        return reply
-
-    def kill(self) -> None:
-        with contextlib.suppress(OSError):
-            self._process.kill()
-        self._process.wait()
-        with contextlib.suppress(OSError):
-            if self._process.stdin is not None:
-                self._process.stdin.close()
-
-    def _listen(self) -> None:
-        stream = self._process.stdout
-        assert stream is not None
-        with stream:
-            while True:
-                try:
-                    self._heard.put(pickle.load(stream))
-                except Exception:
-                    self._heard.put(None)
-                    return
-
-
 class _Children:
     """The processes that wait for a file."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._idle: list[_Child] = []
+        self._idle: list[Child] = []
         self._timer: threading.Timer | None = None
 
-    def take(self) -> _Child:
+    def take(self) -> Child:
         with self._lock:
             while self._idle:
                 child = self._idle.pop()
-                if child.lives:
+                if child.exit_code is None:
                     return child
-                child.kill()
-        return _Child()
+                child.end()
+        return Child(
+            serve, name="studio-reader", environment={INSIDE: "1", "OPENBLAS_NUM_THREADS": "1"}, quiet=True
+        )
 
-    def give_back(self, child: _Child) -> None:
+    def give_back(self, child: Child) -> None:
         with self._lock:
             self._idle.append(child)
             if self._timer is not None:
@@ -173,46 +103,23 @@ class _Children:
         with self._lock:
             ending, self._idle = self._idle, []
         for child in ending:
-            child.kill()
+            child.end()
 
 
 _CHILDREN = _Children()
 
 
-def serve() -> None:
+def serve(inbox: Connection, outbox: Connection) -> None:
     """The main function of the process: reads files until the pipe is closed."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource  # noqa: PLC0415 - not on every system
 
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    # Ctrl-C in the terminal reaches both processes; the parent decides about this one.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Libraries that print must not write into the pipe.
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    while True:
-        try:
-            module, name, path, with_frames, options = pickle.load(sys.stdin.buffer)
-        except (EOFError, OSError):
-            return
-        function = getattr(importlib.import_module(module), name)
-        callbacks = [_progress(answers)] if with_frames else []
-        try:
-            answer = ("result", function(path, *callbacks, **options))
-        except Exception as problem:
-            answer = ("raised", problem)
-        try:
-            content = pickle.dumps(answer)
-        except Exception as problem:
-            content = pickle.dumps(("raised", RuntimeError(str(problem))))
-        answers.write(content)
-        answers.flush()
+    serve_tasks(inbox, outbox)
 
 
-def _progress(answers: BinaryIO) -> OnFrame:
-    def report(done: int, total: int) -> None:
-        pickle.dump(("frame", (done, total)), answers)
-        answers.flush()
-
-    return report
+def _read(module: str, name: str, path: Path, with_frames: bool, options: dict[str, object]) -> object:
+    """The task: a reader by its name, and whether it takes what hears of each frame."""
+    function = getattr(importlib.import_module(module), name)
+    return function(path, *([report] if with_frames else []), **options)

@@ -384,7 +384,7 @@ def layer_summary(record: LayerRecord) -> dict[str, Any]:
     }
 
 
-def frame_summary(result: FrameResult) -> dict[str, object]:
+def frame_summary(result: FrameResult) -> dict[str, Any]:
     return {
         "frame": result.frame,
         "pose": result.estimate.pose,

@@ -7,12 +7,10 @@ them stored (`kernel_cache`), or waits for the one in progress.
 
 import contextlib
 import dataclasses
-import os
-import subprocess
-import sys
 import threading
 from collections.abc import Generator
 from functools import partial
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import cv2
@@ -23,6 +21,7 @@ from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array
+from studio.foundations.children import Child
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.kernel_cache import when_compiling
 from studio.foundations.numba_in_threads import numba
@@ -42,8 +41,6 @@ from studio.search.trackers.tracker import Estimate, FrameResult, start_of
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
-COMMAND = "import sys; from studio.runs.compiling_beside import compile_for; compile_for(*sys.argv[1:])"
-
 
 @contextlib.contextmanager
 def compiling_beside(run: StoredRun) -> Generator[None]:
@@ -55,10 +52,9 @@ def compiling_beside(run: StoredRun) -> Generator[None]:
         yield
 
 
-def compile_for(session_folder: str, run_name: str) -> None:
-    """The process: ends when it is done, or when the one that started it is gone."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    run = Session(Path(session_folder)).run(run_name)
+def compile_for(_inbox: Connection, _outbox: Connection, session_folder: Path, run_name: str) -> None:
+    """The process."""
+    run = Session(session_folder).run(run_name)
     body, cameras = run.body(), run.cameras()
     start = run.record.start_pose
     pose = body.neutral if start is None else np.array(start)
@@ -101,27 +97,9 @@ def _compile_without_outlines(body: BodyModel, cameras: tuple[Camera, ...], pose
 
 
 def _start(run: StoredRun) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-c", COMMAND, str(run.folder.parents[1]), run.name],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-    )
+    child = Child(compile_for, run.folder.parents[1], run.name, name="studio-compiling", quiet=True)
     # Nobody else waits for it: what it has compiled is found.
-    threading.Thread(target=_wait_for, args=(process,), name="compiling beside", daemon=True).start()
-
-
-def _wait_for(process: subprocess.Popen[bytes]) -> None:
-    """Return when it has ended, its pipe closed; closed earlier, the pipe would end it."""
-    process.wait()
-    if process.stdin is not None:
-        process.stdin.close()
-
-
-def _end_with_parent() -> None:
-    sys.stdin.read()
-    os._exit(0)
+    threading.Thread(target=child.end, args=(None,), name="compiling beside", daemon=True).start()
 
 
 def _view(camera: Camera, corners: Array) -> ViewEvidence:

@@ -29,14 +29,16 @@ import {
 } from "./elements.js";
 import { drawChart } from "./findings_charts.js";
 import { isGoing } from "./jobs.js";
+import { askOnEach } from "./events.js";
 import { complain, say } from "./messages.js";
+import { paced } from "./pacing.js";
 import { startTheme } from "./theme.js";
 
 /** @import { Schemas } from "./api_types" */
 
 const FIRST_CLUSTERS = 12;
 const NATS_A_BIT = Math.LN2;
-const POLL_MILLISECONDS = 700;
+const PACE_MILLISECONDS = 300;
 
 const content = byId("content");
 
@@ -44,7 +46,6 @@ let models = [];
 let open = ""; // the model that is shown
 let isNew = false; // whether the form, or what is being learnt, is shown
 let learning = null; // how the model that is learnt, or was last, stands
-let timer = 0;
 let releases = []; // what the shown model has to release
 
 /** @returns {`/api/behaviours/${string}`} */
@@ -360,7 +361,7 @@ async function openNew() {
         learning = progress;
         showProgress();
         drawList();
-        watchLearning();
+        look();
       },
     });
   }
@@ -379,30 +380,25 @@ function showProgress() {
 }
 
 /**
- * Ask how far it is while something is learnt; what was learnt opens, unless another model is being
- * looked at.
+ * Show how the learning stands; what was learnt opens, unless another model is being looked at.
  */
-function watchLearning() {
-  clearTimeout(timer);
+const look = paced(async () => {
   if (!isGoing(learning)) return;
-  timer = setTimeout(async () => {
-    try {
-      learning = (await fetchJson("/api/learning")).progress;
-      if (learning?.learnt && learning.state === "done") {
-        await refresh();
-        say(
-          `${learning.name} is learnt: ${learning.learnt.clusters} clusters, ${learning.learnt.states} states.`,
-        );
-        if (isNew) return await show(learning.name);
-      } else if (isNew) showProgress();
-      else if (learning?.state === "failed") complain(fault(learning.message, learning.hint));
-      drawList();
-    } catch (error) {
-      complain(error);
-    }
-    watchLearning();
-  }, POLL_MILLISECONDS);
-}
+  try {
+    learning = (await fetchJson("/api/learning")).progress;
+    if (learning?.learnt && learning.state === "done") {
+      await refresh();
+      say(
+        `${learning.name} is learnt: ${learning.learnt.clusters} clusters, ${learning.learnt.states} states.`,
+      );
+      if (isNew) return await show(learning.name);
+    } else if (isNew) showProgress();
+    else if (learning?.state === "failed") complain(fault(learning.message, learning.hint));
+    drawList();
+  } catch (error) {
+    complain(error);
+  }
+}, PACE_MILLISECONDS);
 
 /** The first model that can be read, or the words that there is none. */
 async function openFirst() {
@@ -431,7 +427,8 @@ async function start() {
   try {
     learning = (await fetchJson("/api/learning")).progress;
     await refresh();
-    watchLearning();
+    askOnEach("learning", look);
+    look();
     const query = new URLSearchParams(location.search);
     if (query.has("new")) return await openNew();
     const wanted = models.find((model) => model.name === query.get("name"));

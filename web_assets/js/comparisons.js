@@ -14,14 +14,16 @@ import {
 } from "./comparison_result.js";
 import { openForm } from "./studio/dialogs.js";
 import { bar, button, byId, element, fill } from "./elements.js";
+import { askOnEach } from "./events.js";
 import { complain, say } from "./messages.js";
+import { paced } from "./pacing.js";
 import { studioPath } from "./sessions.js";
 import { showSweepForm } from "./sweep_form.js";
 import { onTheme, startTheme } from "./theme.js";
 
 /** @import { Schemas } from "./api_types" */
 
-const POLL_MILLISECONDS = 1000;
+const PACE_MILLISECONDS = 500;
 
 const content = byId("content");
 
@@ -41,7 +43,6 @@ let bodies = [];
 let trackers = [];
 /** @type {any[]} */
 let weightings = [];
-let timer = 0;
 
 /** @returns {`/api/comparisons/${string}/${string}`} */
 const pathOf = ({ session, name }) =>
@@ -101,7 +102,6 @@ async function openComparison({ session, name }) {
   document.title = `${name} of ${session} · Comparisons`;
   show();
   drawList();
-  watchProgress();
 }
 
 function show() {
@@ -235,7 +235,6 @@ function sweepLike({ comparison: line, settings, body, behaviour, fit_shape }) {
 
 /** Take away what is shown, for a form. */
 function clearForForm(kind, initial, title) {
-  clearTimeout(timer);
   clearComparison();
   open = detail = null;
   address({ new: kind, ...(initial.session ? { session: initial.session } : {}) });
@@ -274,23 +273,17 @@ function openNewSweep(initial) {
   drawList();
 }
 
-/** Ask once a second while something is going on. */
-function watchProgress() {
-  clearTimeout(timer);
-  if (![...lines, detail?.comparison].some(isGoing)) return;
-  timer = setTimeout(async () => {
-    try {
-      await refresh();
-      const line = lines.find((one) => same(one, open));
-      if (line && detail && line.status !== detail.comparison.status)
-        return await openComparison(line);
-      if (line) updateProgress(content, line);
-    } catch (error) {
-      complain(error);
-    }
-    watchProgress();
-  }, POLL_MILLISECONDS);
-}
+/** Show how all comparisons stand; the open one again where it has ended, or goes on. */
+const lookAgain = paced(async () => {
+  try {
+    await refresh();
+    const line = lines.find((one) => same(one, open));
+    if (line && detail && line.status !== detail.comparison.status) await openComparison(line);
+    else if (line) updateProgress(content, line);
+  } catch (error) {
+    complain(error);
+  }
+}, PACE_MILLISECONDS);
 
 async function start() {
   startTheme();
@@ -309,6 +302,7 @@ async function start() {
       known.weightings,
       made,
     ];
+    askOnEach("comparison", lookAgain);
     await refresh();
     const query = new URLSearchParams(location.search);
     const wanted = lines.find(

@@ -4,12 +4,14 @@
 
 import { fetchJson, post, readOnly } from "./api.js";
 import { button, drawProgress, element, failure, fill, hint } from "./elements.js";
+import { askOnEach } from "./events.js";
 import { isGoing, progressOf } from "./jobs.js";
+import { paced } from "./pacing.js";
 import { startTheme } from "./theme.js";
 
 /** @import { Schemas } from "./api_types" */
 
-const POLL_MILLISECONDS = 700;
+const PACE_MILLISECONDS = 300;
 const RUN = /^course-/;
 
 /**
@@ -66,16 +68,14 @@ async function showCourse() {
     } catch (error) {
       fill(place, failure(error));
     }
-    await follow();
+    look();
   }
 
-  async function follow() {
-    const course = await fetchJson("/api/course");
-    draw(course);
-    if (isGoing(course.job)) setTimeout(follow, POLL_MILLISECONDS);
-  }
-
-  await follow();
+  const look = paced(async () => {
+    await fetchJson("/api/course").then(draw, console.error);
+  }, PACE_MILLISECONDS);
+  askOnEach("course", look);
+  look();
 }
 
 /** Draw what the reproductions found. @param {HTMLElement} place */

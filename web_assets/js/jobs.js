@@ -1,10 +1,12 @@
-// Background jobs of the server, polled until they have ended.
+// Background jobs of the server, followed by what they say.
 
 import { fault, fetchJson } from "./api.js";
 import { dotted, duration } from "./elements.js";
+import { listenToAll, listenToGaps } from "./events.js";
 
-const POLL_MILLISECONDS = 350;
 const WORTH_SAYING = 2;
+/** What a job's state says while nobody knows it. */
+const UNANSWERED = { step: "the studio does not answer", total: 0, seconds_left: null };
 
 /** The error code of a cancelled job. */
 export const CANCELLED = "cancelled";
@@ -16,21 +18,53 @@ export const GOING = ["queued", "running", "cancelling"];
 export const isGoing = (job) => GOING.includes(job?.state);
 
 /**
- * Follow the job at an address; resolves with its last state, "done" or "cancelled", and throws
- * what went wrong. `report` gets each state on the way; once `gone()` nothing waits any more:
- * resolves with null.
- * @param {string} path
+ * Follow the job at an address by its events; resolves with its last state, "done" or "cancelled",
+ * and throws what went wrong. `report` gets each state on the way; once `gone()` nothing waits any
+ * more: resolves with null. How it stands is asked for at first, and where events may have been
+ * missed; while the studio does not answer, that is reported.
+ * @param {any} path
+ * @returns {Promise<any>}
  */
-export async function followJob(path, report = (_job) => {}, gone = () => false) {
-  for (;;) {
-    const job = await fetchJson(path);
-    if (gone()) return null;
-    if (job.state === "failed") throw fault(job.message, job.hint, { code: job.code });
-    if (!isGoing(job)) return job;
-    report(job);
-    await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-    if (gone()) return null;
-  }
+export function followJob(path, report = (_job) => {}, gone = () => false) {
+  return new Promise((resolve, reject) => {
+    /** @type {any} */
+    let last = { state: "queued" };
+    let heard = 0;
+    const stops = [
+      listenToAll((event) => {
+        if ("at" in event && event.at === path) take(event);
+      }),
+      listenToGaps(ask),
+    ];
+    /** @param {(value: any) => void} settle @param {any} value */
+    function end(settle, value) {
+      for (const stop of stops) stop();
+      settle(value);
+    }
+    /** @param {any} job */
+    function take(job) {
+      heard += 1;
+      last = job;
+      if (gone()) end(resolve, null);
+      else if (job.state === "failed")
+        end(reject, fault(job.message, job.hint, { code: job.code }));
+      else if (!isGoing(job)) end(resolve, job);
+      else report(job);
+    }
+    async function ask() {
+      const before = heard;
+      try {
+        const job = await fetchJson(path);
+        // What was heard meanwhile is newer.
+        if (heard === before) take(job);
+      } catch (error) {
+        if (gone()) end(resolve, null);
+        else if (error.status) end(reject, error);
+        else if (heard === before) report({ ...last, ...UNANSWERED });
+      }
+    }
+    ask();
+  });
 }
 
 /**

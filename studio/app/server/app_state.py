@@ -50,6 +50,7 @@ class AppState:
     def __post_init__(self) -> None:
         """Give all work beside the routes its place, which reports its progress to all watchers."""
         self.jobs = JobRunner(self.events.publish, self.log_path, partial(keep_in_place, self.workspace))
+        self.events.under_way = self.jobs.messages
         self.cameras = CameraService(self.jobs)
 
     @property

@@ -7,12 +7,14 @@ infinities become null. A layer's particles are not in it: they are fetched from
 """
 
 import dataclasses
+from dataclasses import dataclass
 from typing import Any, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.foundations.arrays import Array
 from studio.operations.jobs.events import (
     Acknowledged,
     Event,
@@ -22,7 +24,43 @@ from studio.operations.jobs.events import (
     SettingsApplied,
     StateChanged,
 )
-from studio.operations.stored_frames import frame_summary, layer_summary
+from studio.operations.stored_frames import LayerView, frame_summary, layer_summary
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LayerMessage(LayerView):
+    """A layer without its particles.
+
+    waited_milliseconds : from the slider that it answers, null where it answers none.
+    search_layers, searches : layers of one search of the frame, and how many searches the frame has.
+    """
+
+    session: str
+    run: str
+    reannealed: bool
+    waited_milliseconds: float
+    search_layers: int
+    searches: int
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FrameMessage:
+    """A frame's result. trial : the name under which a frame that was annealed again is kept, "" where it is not."""
+
+    session: str
+    run: str
+    reannealed: bool
+    frame: int
+    pose: Array
+    log_weight: float
+    layers: int
+    evaluations: int
+    settings_version: int
+    milliseconds: float
+    tracking: str
+    limbs_off: tuple[str, ...]
+    trial: str = ""
+
 
 TYPES: dict[type[Event], str] = {
     StateChanged: "state",
@@ -45,19 +83,31 @@ def plain(message: dict[str, object]) -> dict[str, object]:
 
 
 def message_of(event: Event) -> dict[str, object]:
-    head: dict[str, object] = {"type": TYPES[type(event)], "session": event.session, "run": event.run}
+    """A message of the tracking process: its type, and the entries of its record."""
+    record = _record_of(event)
+    entries = {entry.name: getattr(record, entry.name) for entry in dataclasses.fields(record)}
+    return {"type": TYPES[type(event)], **entries}
+
+
+def _record_of(event: Event) -> Event | LayerMessage | FrameMessage:
     if isinstance(event, LayerFinished):
-        more = {
-            "reannealed": event.reannealed,
-            "waited_milliseconds": 1000.0 * (event.left_at - event.requested_at),
-            "search_layers": event.search_layers,
-            "searches": event.searches,
-            "outline": None,
-        }
-        return head | more | layer_summary(event.record)
+        return LayerMessage(
+            session=event.session,
+            run=event.run,
+            reannealed=event.reannealed,
+            waited_milliseconds=1000.0 * (event.left_at - event.requested_at),
+            search_layers=event.search_layers,
+            searches=event.searches,
+            **layer_summary(event.record),
+        )
     if isinstance(event, FrameFinished):
-        return head | {"reannealed": event.reannealed} | frame_summary(event.result)
-    return head | {entry.name: getattr(event, entry.name) for entry in dataclasses.fields(event)[2:]}
+        return FrameMessage(
+            session=event.session,
+            run=event.run,
+            reannealed=event.reannealed,
+            **frame_summary(event.result),
+        )
+    return event
 
 
 def key_of(message: dict[str, object]) -> tuple[object, ...] | None:
@@ -65,9 +115,9 @@ def key_of(message: dict[str, object]) -> tuple[object, ...] | None:
     kind = message["type"]
     if kind in ("state", "settings", "sessions", "scene"):
         return (kind,)
-    if "step" in message:
+    if "key" in message:
         # How a job stands.
-        return (kind, *(message.get(name) for name in ("session", "identifier", "name")))
+        return (kind, message["key"])
     if kind == "layer":
         return (kind, message["frame"], message["layer"], message["reannealed"])
     if kind == "frame":

@@ -1,7 +1,8 @@
 """The messages of `WebSocket /api/events`, described for the API's document: `EventMessage`, distinguished by `type`.
 
 A message of the tracking process has the entries of its event (`jobs/events.py`), one of a job those of its state
-(`JobKind.states`). `event_encoding` makes them.
+(`JobKind.states`), its `key` and `at`, the address at which the same is asked for. `event_encoding` and `Job.message`
+make them.
 """
 
 import dataclasses
@@ -15,12 +16,10 @@ from pydantic_core import core_schema
 
 from studio.app.scene.model import Selection
 from studio.app.server.answers import shown_as
-from studio.app.server.event_encoding import TYPES
+from studio.app.server.event_encoding import TYPES, FrameMessage, LayerMessage
 from studio.app.server.scene_routes import LayersPlayed
-from studio.app.server.schemas import Answer, Number, Numbers
 from studio.operations.jobs.events import Acknowledged, Event, LogLine, SettingsApplied, StateChanged
 from studio.operations.jobs.job_runner import JobKind
-from studio.operations.stored_frames import LayerView
 
 REFERENCE = "#/components/schemas/{model}"
 
@@ -44,44 +43,10 @@ class SceneMoved(Selection):
     layers: LayersPlayed = dataclasses.field(kw_only=True)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class LayerSaid(LayerView):
-    """A layer without its particles.
-
-    waited_milliseconds : from the slider that it answers, null where it answers none.
-    search_layers, searches : layers of one search of the frame, and how many searches the frame has.
-    """
-
-    session: str
-    run: str
-    reannealed: bool
-    waited_milliseconds: float
-    search_layers: int
-    searches: int
-
-
-class FrameSaid(Answer):
-    """A frame's result. trial: the name under which a frame that was annealed again is kept, "" where it is not."""
-
-    session: str
-    run: str
-    reannealed: bool
-    frame: int
-    pose: Numbers
-    log_weight: Number
-    layers: int
-    evaluations: int
-    settings_version: int
-    milliseconds: Number
-    tracking: str
-    limbs_off: list[str]
-    trial: str
-
-
 MESSAGES: dict[str, type] = {
     **{TYPES[kind]: kind for kind in (StateChanged, Acknowledged, SettingsApplied, LogLine)},
-    "layer": shown_as(LayerSaid),
-    "frame": FrameSaid,
+    "layer": shown_as(LayerMessage),
+    "frame": shown_as(FrameMessage),
     "scene": SceneMoved,
     "sessions": Changed,
     "notes": Changed,
@@ -113,15 +78,20 @@ def event_schemas(kinds: Sequence[JobKind[Any]]) -> dict[str, Any]:
         (name, "serialization", TypeAdapter(content)) for name, content in contents.items()
     ]
     made, known = TypeAdapter.json_schemas(adapters, ref_template=REFERENCE, schema_generator=_AsSent)
-    messages = [_message(name, made[name, "serialization"]) for name in contents]
+    jobs = {kind.event for kind in kinds}
+    messages = [
+        _message(name, made[name, "serialization"], ("key", "at") if name in jobs else ())
+        for name in contents
+    ]
     return known["$defs"] | {"EventMessage": {"oneOf": messages}}
 
 
-def _message(name: str, content: JsonSchemaValue) -> JsonSchemaValue:
-    """The schema of a message: what all have, and its own entries."""
+def _message(name: str, content: JsonSchemaValue, also: Sequence[str]) -> JsonSchemaValue:
+    """The schema of a message: what all have, what else those of its kind have, and its own entries."""
+    texts = ("session", "run", *also)
     head = {
         "type": "object",
-        "required": ["type", "session", "run"],
-        "properties": {"type": {"const": name}, "session": {"type": "string"}, "run": {"type": "string"}},
+        "required": ["type", *texts],
+        "properties": {"type": {"const": name}, **{text: {"type": "string"} for text in texts}},
     }
     return {"allOf": [head, content]}

@@ -8,7 +8,7 @@ beyond the limit is counted and said.
 import asyncio
 import queue
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
@@ -39,7 +39,7 @@ Watcher = Subscription[str]
 class EventStream:
     """Takes the worker's events and the web's own messages to all watchers. scenes : the open ones by window; layers,
     of which there are many, go to the windows whose scene shows their run. outlines : of the layers' clouds. tried :
-    what was annealed again.
+    what was annealed again. under_way : gives what a new watcher is told besides, how the jobs stand.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class EventStream:
     ) -> None:
         self._control, self._scenes, self._outlines = control, scenes, outlines
         self.tried = TriedFrames()
+        self.under_way: Callable[[], Sequence[dict[str, object]]] = list
         self._lock = threading.Lock()
         self._watchers: dict[Watcher, str] = {}
         self._settings: dict[str, object] | None = None
@@ -66,10 +67,13 @@ class EventStream:
             self._task = None
 
     def watch(self, window: str = "") -> Watcher:
-        """A new watcher, greeted with the present state and settings. window : that it belongs to, "" for none."""
+        """A new watcher, greeted with the present state, settings and jobs.
+
+        window : that it belongs to, "" for none.
+        """
         watcher = Watcher(LIMIT)
         with self._lock:
-            for message in (message_of(self._control.state), self._settings):
+            for message in (message_of(self._control.state), self._settings, *self.under_way()):
                 if message is not None:
                     watcher.put(as_json(message), key_of(message))
             self._watchers[watcher] = window
@@ -132,8 +136,8 @@ class EventStream:
 
 @router.websocket("/api/events")
 async def events(socket: WebSocket, window: WindowInQuery = "") -> None:
-    """Every event as one JSON text message, state and settings first; what a browser sends is ignored. Of the
-    `scene` events only those of `window`'s own scene.
+    """Every event as one JSON text message; state, settings and jobs under way come first. What a browser sends is
+    ignored. Of the `scene` events only those of `window`'s own scene.
     """
     stream: EventStream = socket.app.state.studio.events
     await socket.accept()

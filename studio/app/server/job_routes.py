@@ -1,9 +1,7 @@
 """Work in the background: the list of all of it, and of every kind the addresses of its state and to stop it."""
 
 from dataclasses import dataclass
-from string import Formatter
 from typing import Annotated
-from urllib.parse import quote
 
 from fastapi import APIRouter, Query
 from pydantic import Field, FiniteFloat
@@ -11,7 +9,7 @@ from pydantic import Field, FiniteFloat
 from studio.app.server.answers import Router
 from studio.app.server.app_state import App
 from studio.foundations.records import extended
-from studio.operations.jobs.job_runner import Job, JobKind, SessionJob, State
+from studio.operations.jobs.job_runner import Job, JobKind, SessionJob, State, entries_of
 
 router = Router(prefix="/api", tags=["jobs"])
 
@@ -65,29 +63,18 @@ def stop_job(kind: str, key: str, app: App) -> JobLine:
 
 
 def _line(job: Job) -> JobLine:
-    state, kind = job.state, job.kind
-    fields = dict(state)
-    fields["run"] = fields.get("made_run") or fields.get("run")
+    state, kind, entries = job.state, job.kind, entries_of(job.state)
     return extended(
         JobLine,
         state,
         kind=kind.event,
         noun=kind.noun,
         key=state.key,
-        **{name: str(fields.get(name) or "") for name in ("name", "run", "verb")},
+        **{name: str(entries.get(name) or "") for name in ("name", "run", "verb")},
         began=job.began,
-        at=_fill(kind.at, fields),
-        page=_fill(kind.page, fields),
+        at=kind.address(state),
+        page=kind.page_of(state),
     )
-
-
-def _fill(address: str, fields: dict[str, object]) -> str:
-    parts = {
-        name: quote(str(fields.get(name) or ""), safe="")
-        for _, name, _, _ in Formatter().parse(address)
-        if name
-    }
-    return address.format(**parts)
 
 
 def add_job_routes(router: APIRouter, path: str, kind: JobKind[State]) -> None:

@@ -26,10 +26,11 @@ from uuid import uuid4
 
 from pydantic import Field
 
+from studio.foundations.children import answered
 from studio.foundations.declaring import Terminal, Web
 from studio.foundations.errors import RunError, SessionError, StudioError, WorkCancelledError
 from studio.foundations.progress import heard_by
-from studio.operations.jobs.process_executor import ProcessLostError, answered
+from studio.operations.jobs.process_executor import ProcessLostError
 from studio.results.comparison.kept_trials import measured_by
 from studio.sessions.atomic_files import PARTIAL_PREFIX
 from studio.sessions.object_stores import Store, is_address

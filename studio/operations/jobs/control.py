@@ -28,7 +28,6 @@ from studio.foundations.knobs import Value
 from studio.operations.jobs import commands
 from studio.operations.jobs.events import Acknowledged, Event, RunState, StateChanged, nothing_open
 from studio.operations.jobs.process import LOST_HINT, SILENT_SECONDS, OwnedProcess
-from studio.operations.jobs.process_executor import ending
 from studio.operations.jobs.watchers import Subscription, Watchers
 from studio.sessions.workspace import Workspace
 
@@ -232,7 +231,7 @@ class StudioControl:
         if process.exit_code == 0:
             self._publish(self._said)
         else:
-            self._lose(f"The tracking process died ({ending(process.exit_code)}).")
+            self._lose(f"The tracking process died ({process.death()}).")
         _leave_unanswered(answers)
 
     def _lose(self, message: str) -> None:

@@ -14,7 +14,9 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from string import Formatter
 from typing import Any, Generic, TypeVar, cast
+from urllib.parse import quote
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -117,6 +119,14 @@ class JobKind(Generic[SomeState]):
     at: str = ""
     page: str = ""
 
+    def address(self, state: SessionJob) -> str:
+        """Where a state of this kind is asked for, "" where its page has it."""
+        return _fill(self.at, state)
+
+    def page_of(self, state: SessionJob) -> str:
+        """The page that shows what came of it."""
+        return _fill(self.page, state)
+
     def entries(self, record: object, **own: object) -> dict[str, object]:
         """The entries of the state that a record has. own : those that differ, or that it lacks."""
         names = self.states.model_fields.keys() - SessionJob.model_fields.keys() - own.keys()
@@ -152,14 +162,19 @@ class Job:
         """Whether it is to end."""
         return self._stop.is_set()
 
+    @property
+    def message(self) -> dict[str, object]:
+        """How it stands, as an event: by `at` whoever follows it knows it, and asks for the same."""
+        state = self.state
+        head = {"type": self.kind.event, "run": "", "key": state.key, "at": self.kind.address(state)}
+        return head | state.model_dump(mode="json", by_alias=True)
+
     def change(self, **changes: object) -> None:
         """Replace entries of the state and report to all pages; from any thread."""
         with self._lock:
             # Validated, so that numbers that are none become null.
             self.state = self.kind.states.model_validate({**dict(self.state), **changes})
-            self._publish(
-                {"type": self.kind.event, "run": "", **self.state.model_dump(mode="json", by_alias=True)}
-            )
+            self._publish(self.message)
 
     def report(self, step: str, done: int, total: int, **more: object) -> None:
         """Tell how far the work is: at once for a new step and for its end, else as often as is read.
@@ -242,6 +257,7 @@ class JobRunner:
             over = [key for key, known in jobs.items() if not known.state.state.is_going]
             for key in over[: max(0, len(jobs) - KEPT)]:
                 del jobs[key]
+            self._publish(job.message)
             self._threads.submit(job.do, self._known_to_others(work), self._log_path)
         return state
 
@@ -311,6 +327,10 @@ class JobRunner:
         ]
         return sorted(known, key=lambda job: job.began)
 
+    def messages(self) -> list[dict[str, object]]:
+        """How each that is not over stands, for whoever begins to watch."""
+        return [job.message for job in self.jobs() if job.state.state.is_going]
+
     def stop(self, event: str, key: str) -> Job:
         """Let a job of a kind end where it stands. Raises NotFoundError."""
         job = self._jobs.get(event, {}).get(key)
@@ -369,6 +389,18 @@ class JobRunner:
         if job is None:
             raise NotFoundError(f"There is no {kind.noun} '{key[:40]}'.", "Begin a new one.")
         return job
+
+
+def entries_of(state: SessionJob) -> dict[str, object]:
+    """A state's entries; `run` is the one that a job made, where it made one."""
+    entries = dict(state)
+    return entries | {"run": entries.get("made_run") or entries.get("run")}
+
+
+def _fill(address: str, state: SessionJob) -> str:
+    fields = entries_of(state)
+    names = {name for _, name, _, _ in Formatter().parse(address) if name}
+    return address.format(**{name: quote(str(fields.get(name) or ""), safe="") for name in names})
 
 
 def _busy(kind: JobKind[State], state: State) -> RunError:

@@ -1,18 +1,15 @@
 """The tracking process: commands in, events out, one layer between them; and its other end, in the server.
 
-It is started with `spawn`, so it shares nothing with the server but two pipes. Commands come through one,
-which also says (by its end) that the server is gone; events leave through the other from a thread of their
-own, newest first to win, so that a slow server never holds up the search. The same thread sends a heartbeat
-when there is nothing else to say.
+Commands come through one pipe, which also says (by its end) that the server is gone; events leave through the other
+from a thread of their own, newest first to win, so that a slow server never holds up the search. The same thread sends
+a heartbeat when there is nothing else to say.
 """
 
 import contextlib
 import dataclasses
 import logging
-import multiprocessing
 import pickle
 import queue
-import signal
 import threading
 import time
 import traceback
@@ -20,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
+from studio.foundations.children import Child, EndedError
 from studio.foundations.errors import RunError
 from studio.operations.jobs.commands import Command, Stop
 from studio.operations.jobs.events import Event, LayerFinished, LogLine
@@ -46,8 +44,6 @@ class Heartbeat:
 
 def run_process(inbox: Connection, outbox: Connection) -> None:
     """The process's whole life: until a Stop, or until the server is gone."""
-    # Ctrl-C in the terminal reaches both processes; the server decides what becomes of this one.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     events = Subscription[Event]()
     sender = threading.Thread(target=_send_all, args=(events, outbox), name="events-out", daemon=True)
     sender.start()
@@ -113,38 +109,32 @@ class OwnedProcess:
         on_silence: "Callable[[OwnedProcess, bool], None]",
         on_end: "Callable[[OwnedProcess], None]",
     ) -> None:
-        context = multiprocessing.get_context("spawn")
-        inbox_end, inbox = context.Pipe(duplex=False)
-        outbox, outbox_end = context.Pipe(duplex=False)
         self._on_event, self._on_silence, self._on_end = on_event, on_silence, on_end
-        self._inbox, self._outbox = inbox, outbox
         self._sending = threading.Lock()
-        self._process = context.Process(
-            target=run_process, args=(inbox_end, outbox_end), name="studio-tracking", daemon=True
-        )
-        self._process.start()
-        # Only the process itself may hold these ends: then a pipe ends when the process does.
-        inbox_end.close()
-        outbox_end.close()
+        self._child = Child(run_process, name="studio-tracking", knows_script=True, finishes=True)
         self._thread = threading.Thread(target=self._listen, name="tracking-events", daemon=True)
         self._thread.start()
 
     @property
     def identifier(self) -> int | None:
         """The process's id, None once it is gone."""
-        return self._process.pid if self._process.is_alive() else None
+        return self._child.identifier if self._child.exit_code is None else None
 
     @property
     def exit_code(self) -> int | None:
         """How it ended (0: as it was requested to; negative: by a signal), None while it lives."""
-        return self._process.exitcode
+        return self._child.exit_code
+
+    def death(self) -> str:
+        """How it ended, as the end of a sentence."""
+        return self._child.death()
 
     def send(self, command: Command) -> None:
         """Post a command. Raises RunError if the process is gone."""
         try:
             with self._sending:
-                self._inbox.send(command)
-        except (BrokenPipeError, OSError):
+                self._child.send(command)
+        except EndedError:
             raise RunError("The tracking process has died.", LOST_HINT) from None
 
     def end(self, patience: float) -> None:
@@ -152,17 +142,16 @@ class OwnedProcess:
         if patience > 0.0:
             with contextlib.suppress(RunError):
                 self.send(Stop())
-            self._process.join(patience)
-        if self._process.is_alive():
-            self._process.kill()
-        self._process.join()
+            self._child.wait(patience)
+        self._child.kill()
         if threading.current_thread() is not self._thread:
             self._thread.join()
-        self._inbox.close()
+        with self._sending:
+            self._child.end()
 
     def _listen(self) -> None:
         """Take everything that the process says, until it ends."""
-        outbox, silent, patience = self._outbox, False, STARTING_SECONDS
+        outbox, silent, patience = self._child.outbox, False, STARTING_SECONDS
         while True:
             try:
                 if not outbox.poll(patience):
@@ -182,6 +171,5 @@ class OwnedProcess:
             except Exception:
                 # One event that cannot be passed on must not make its owner deaf.
                 logger.exception("An event of the tracking process could not be passed on.")
-        outbox.close()
-        self._process.join()
+        self._child.wait()
         self._on_end(self)

@@ -4,28 +4,21 @@ Unlike `ProcessPoolExecutor`, a process that dies costs its own task only, tasks
 process, and a shutdown that cancels ends what is running, too.
 """
 
-import multiprocessing
 import os
 import pickle
-import signal
 import threading
-import traceback
-from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import parent_process
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
+from studio.foundations.children import UNGUARDED, Child, EndedError, serve_tasks
 from studio.foundations.errors import RunError
-from studio.foundations.progress import heard_by
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
-# Libraries read these when they are loaded, so they are set while a process is started.
 ONE_CORE: Mapping[str, str] = dict.fromkeys(
     (
         "NUMBA_NUM_THREADS",
@@ -36,10 +29,6 @@ ONE_CORE: Mapping[str, str] = dict.fromkeys(
     ),
     "1",
 )
-PATIENCE = 5.0
-"""How long a process that hung up may take to end, s."""
-UNGUARDED = 76
-"""Exit code of a process that would have started processes while it was being started itself."""
 
 
 class ProcessLostError(RunError):
@@ -162,8 +151,7 @@ class _Seat:
         self.near: Hashable = None
         self.thread = threading.Thread()
         self._environment, self._on_report, self._niceness = environment, on_report, niceness
-        self._process: BaseProcess | None = None
-        self._pipe: Connection | None = None
+        self._child: Child | None = None
         self._starting = threading.Lock()
 
     def run(self, content: bytes, unwanted: Callable[[], bool]) -> object:
@@ -171,16 +159,18 @@ class _Seat:
         with self._starting:
             if unwanted():
                 raise ProcessLostError("The task was cancelled.")
-            pipe = self._pipe or self._start()
+            child = self._child = self._child or self._start()
         try:
-            pipe.send_bytes(content)
-            while True:
-                kind, answer = pipe.recv()
-                if kind != "report":
-                    break
-                self._on_report(*answer)
-        except (EOFError, OSError, pickle.UnpicklingError):
-            raise self._death() from None
+            kind, answer = child.answer(content, self._on_report)
+        except EndedError:
+            how, code = child.death(), child.exit_code
+            self.end()
+            if code == UNGUARDED:
+                raise RunError(
+                    "Its process runs this script again from the beginning, as Python's do.",
+                    "Put what the script does under \"if __name__ == '__main__':\".",
+                ) from None
+            raise ProcessLostError(f"The process that ran it {how}.") from None
         if kind == "raised":
             raise answer
         return answer
@@ -188,112 +178,28 @@ class _Seat:
     def kill(self) -> None:
         """End the process at once, if there is one."""
         with self._starting:
-            if self._process is not None:
-                self._process.kill()
+            if self._child is not None:
+                self._child.kill()
 
     def end(self) -> None:
         """The same, and wait for its end."""
         with self._starting:
-            if self._process is not None and self._pipe is not None:
-                self._process.kill()
-                self._process.join()
-                self._pipe.close()
-            self._pipe = self._process = None
+            if self._child is not None:
+                self._child.end()
+            self._child = None
 
-    def _start(self) -> Connection:
-        if getattr(multiprocessing.current_process(), "_inheriting", False):
-            # A process that another one's script started: it runs that script, which starts processes, from its
-            # beginning.
-            os._exit(UNGUARDED)
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(
-            target=_run_tasks, args=(theirs, self._niceness), name="studio-task", daemon=True
+    def _start(self) -> Child:
+        return Child(
+            _run_tasks,
+            self._niceness,
+            name="studio-task",
+            environment=self._environment,
+            knows_script=True,
         )
-        # Only the process itself may hold the other end: then the pipe ends when the process does.
-        with theirs, _environment(self._environment):
-            process.start()
-        self._process, self._pipe = process, ours
-        return ours
-
-    def _death(self) -> RunError:
-        """That the process ended, and how."""
-        assert self._process is not None
-        self._process.join(PATIENCE)
-        code = self._process.exitcode
-        self.end()
-        if code == UNGUARDED:
-            return RunError(
-                "Its process runs this script again from the beginning, as Python's do.",
-                "Put what the script does under \"if __name__ == '__main__':\".",
-            )
-        return ProcessLostError(f"The process that ran it {ending(code)}.")
 
 
-def ending(exit_code: int | None) -> str:
-    """How a process ended, as the end of a sentence: "ended by signal 9, SIGKILL"."""
-    if exit_code is not None and exit_code < 0:
-        return f"ended by signal {-exit_code}, {signal.Signals(-exit_code).name}"
-    return f"ended with exit code {exit_code}"
-
-
-_starting = threading.Lock()
-
-
-@contextmanager
-def _environment(values: Mapping[str, str]) -> Generator[None]:
-    """Environment variables for a process that is being started, one at a time."""
-    with _starting:
-        before = {name: os.environ.get(name) for name in values}
-        os.environ.update(values)
-        try:
-            yield
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    os.environ.pop(name, None)
-                else:
-                    os.environ[name] = value
-
-
-# ------------------------------------------------------------------ in the process
-
-
-def _run_tasks(pipe: Connection, niceness: int) -> None:
-    """The process's whole life: tasks in, what they report and what comes of them out, until the other end is gone."""
-
-    def report(*words: object) -> None:
-        with suppress(OSError):
-            pipe.send(("report", words))
-
-    # Ctrl-C in the terminal reaches all processes; the one that started them decides.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _run_tasks(inbox: Connection, outbox: Connection, niceness: int) -> None:
+    """The process's whole life."""
     if niceness and hasattr(os, "nice"):
         os.nice(niceness)
-    threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
-    with suppress(EOFError, OSError), heard_by(report):
-        while True:
-            pipe.send_bytes(answered(pipe.recv_bytes()))
-
-
-def answered(content: bytes) -> bytes:
-    """Run a pickled (function, arguments, options); ("returned", result) or ("raised", exception), pickled."""
-    try:
-        function, arguments, options = pickle.loads(content)
-        answer = ("returned", function(*arguments, **options))
-    except Exception as problem:
-        problem.add_note(traceback.format_exc())
-        answer = ("raised", problem)
-    try:
-        return pickle.dumps(answer)
-    except Exception as problem:
-        what = f"What came of it cannot be pickled: {problem!r}; {answer[1]!r:.200}"
-        return pickle.dumps(("raised", RuntimeError(what)))
-
-
-def _end_with_parent() -> None:
-    """The result is of no use once the process that submitted the task was killed."""
-    parent = parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
+    serve_tasks(inbox, outbox)

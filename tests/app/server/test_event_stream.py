@@ -4,6 +4,7 @@ import asyncio
 import json
 import math
 import queue
+import threading
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from studio.app.scene.model import Selection
 from studio.app.server.api_document import api_document
 from studio.app.server.event_encoding import key_of, message_of
 from studio.app.server.event_stream import LIMIT, EventStream, Watcher, _send_all
+from studio.app.server.subject_routes import SUBJECT
 from studio.operations.jobs.events import Acknowledged, FrameFinished, LayerFinished, LogLine, SettingsApplied
+from studio.operations.jobs.job_runner import Job
 from studio.operations.stored_frames import effective_share, layer_summary
 from studio.search.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord
 
@@ -147,6 +150,28 @@ def test_who_comes_later_is_reported_state_and_settings(studio: Studio) -> None:
             assert next_of(late, "settings")["values"] == {"survival": 0.4}
 
 
+def test_who_comes_later_is_told_of_jobs_under_way(studio: Studio) -> None:
+    go = threading.Event()
+    jobs = studio.app.state.studio.jobs
+
+    def work(job: Job) -> dict[str, object]:
+        job.report("reading", 1, 4)
+        assert go.wait(60)
+        return {}
+
+    begun = jobs.begin(SUBJECT, SUBJECT.states(session="take1"), work)
+    at = f"/api/subject-fits/{begun.identifier}"
+    with watching(studio) as socket:
+        greeting = next_of(socket, "subject")
+        check_described(greeting)
+        assert (greeting["at"], greeting["key"]) == (at, begun.identifier)
+        go.set()
+        while (message := next_of(socket, "subject"))["state"] != "done":
+            pass
+    answer = studio.client.get(at).json()
+    assert {name: message[name] for name in answer} == answer, "what is heard is what is asked for"
+
+
 def test_changes_of_the_workspace_and_moves_of_the_scene_are_reported(studio: Studio) -> None:
     with watching(studio) as socket:
         next_of(socket, "state")
@@ -217,10 +242,9 @@ def test_a_watcher_that_sleeps_holds_a_bounded_number_of_messages() -> None:
 
 @pytest.mark.parametrize("kind", ["import", "track", "comparison", "learning", "recording"])
 def test_of_each_job_the_newest_state_stands(kind: str) -> None:
-    response = {"type": kind, "session": "s", "run": "", "step": "reading", "identifier": "1", "name": "n"}
+    response = {"type": kind, "session": "s", "run": "", "step": "reading", "key": "1"}
     assert key_of(response) == key_of({**response, "step": "writing"})
-    assert key_of(response) != key_of({**response, "identifier": "2"})
-    assert key_of(response) != key_of({**response, "name": "m"})
+    assert key_of(response) != key_of({**response, "key": "2"})
 
 
 def test_a_flood_of_events_does_not_hold_up_requests(studio: Studio) -> None:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect
+from playwright.sync_api import Browser, BrowserContext, Page, WebSocketRoute, expect
+from waiting import until
 from web_doubles import TOKEN, Studio, state_of
 
 from studio.app.server import background_routes, track_routes
@@ -130,6 +131,47 @@ def test_a_fit_is_found_again_wherever_it_is_looked_for(
     save.click()
     expect(other.locator(".subject-fit")).to_contain_text("Saved.")
     assert held.begun == 2
+
+
+@pytest.mark.slow
+def test_a_job_is_heard_and_asked_for_again_only_after_the_socket_was_lost(
+    context: BrowserContext, studio: Studio, held: HeldFit
+) -> None:
+    sockets: list[WebSocketRoute] = []
+    is_cut = False
+
+    def connect(socket: WebSocketRoute) -> None:
+        if is_cut:
+            socket.close()
+        else:
+            socket.connect_to_server()
+            sockets.append(socket)
+
+    context.route_web_socket("**/api/events**", connect)
+    page = opened(context, studio, "/way?session=take1&step=subject")
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+
+    def times() -> int:
+        return sum("/api/subject-fits/" in url and "/frames/" not in url for url in asked)
+
+    page.get_by_role("button", name="Fit the subject").click()
+    bar = page.locator(".subject-fit .step-progress")
+    expect(bar).to_contain_text("2 of 3, fitting lengths and radii · 30 %")
+    page.wait_for_timeout(1500)
+    assert times() == 1, "once, when it is begun to be followed"
+
+    # The studio is away: that is said, and the job ends meanwhile.
+    is_cut = True
+    context.set_offline(True)
+    for socket in sockets:
+        socket.close()
+    expect(bar).to_contain_text("the studio does not answer")
+    held.go.set()
+    until(lambda: not studio.client.get("/api/jobs").json()["jobs"][0]["state"].endswith("ing"))
+    is_cut = False
+    context.set_offline(False)
+    expect(page.get_by_role("button", name="Save as the subject")).to_be_visible()
 
 
 @pytest.fixture

@@ -36,7 +36,9 @@ class WeighingState(NumberedJob):
     weight: Number = None
 
 
-WEIGHING = JobKind("weighing", "weighing", WeighingState, changes_session=True)
+WEIGHING = JobKind(
+    "weighing", "weighing", WeighingState, changes_session=True, at="/weighings/{identifier}?of={session}"
+)
 SHOPPING = JobKind("shopping", "shopping", SessionJob)
 
 
@@ -102,10 +104,30 @@ def test_what_work_returns_goes_into_its_state(office: Office) -> None:
         for message in office.said
     ]
     assert steps == [
-        ("weighing", "", "running", ""), ("weighing", "", "running", "reading"), ("weighing", "", "done", "reading"),
+        ("weighing", "", "queued", ""), ("weighing", "", "running", ""), ("weighing", "", "running", "reading"),
+        ("weighing", "", "done", "reading"),
         ("sessions", "", None, None),
     ]  # fmt: skip
-    assert [message["session"] for message in office.said] == ["take1"] * 4
+    assert [message["session"] for message in office.said] == ["take1"] * 5
+
+
+def test_who_begins_to_watch_is_told_of_what_is_not_over(office: Office) -> None:
+    go = threading.Event()
+
+    def waits(job: Job) -> Mapping[str, object]:
+        job.report("reading", 1, 4)
+        assert go.wait(PATIENCE)
+        return {}
+
+    begun = office.begin(waits)
+    office.until("reading", RUNNING)
+    [message] = office.jobs.messages()
+    assert message == office.said[-1]
+    at = f"/weighings/{begun.identifier}?of=take1"
+    assert (message["key"], message["at"], message["step"]) == (begun.identifier, at, "reading")
+    go.set()
+    office.until(begun.identifier, DONE)
+    assert office.jobs.messages() == []
 
 
 @pytest.mark.parametrize("kind", [WEIGHING, SHOPPING, BAKING])
@@ -199,7 +221,7 @@ def test_a_job_can_be_cancelled(office: Office, work: Work, message: str) -> Non
     office.until(begun.identifier, CANCELLED)
     reported = office.jobs.state(WEIGHING, begun.identifier)
     assert (reported.state, reported.message) == (CANCELLED, message)
-    assert office.states(begun.identifier) == ["running", "cancelling", "cancelled"]
+    assert office.states(begun.identifier) == ["queued", "running", "cancelling", "cancelled"]
     office.jobs.cancel(WEIGHING, begun.identifier)
     assert office.jobs.state(WEIGHING, begun.identifier).state is CANCELLED, "what is over stays over"
     assert not [said for said in office.said if said["type"] == "sessions"]
@@ -216,8 +238,8 @@ def test_one_that_waits_is_queued_and_cancelled_without_being_begun(office: Offi
     go.set()
     office.until(unwanted.identifier, CANCELLED)
     office.until(waiting.identifier, DONE)
-    assert office.states(waiting.identifier) == ["running", "done"]
-    assert office.states(unwanted.identifier) == ["cancelling", "cancelled"]
+    assert office.states(waiting.identifier) == ["queued", "running", "done"]
+    assert office.states(unwanted.identifier) == ["queued", "cancelling", "cancelled"]
 
 
 def test_of_some_kinds_there_is_one_at_a_time(office: Office) -> None:

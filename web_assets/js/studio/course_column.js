@@ -3,8 +3,11 @@
 // names a knob is a number to be dragged.
 
 import { fetchJson, post, readOnly } from "../api.js";
+import { askOnEach } from "../events.js";
+import { isGoing } from "../jobs.js";
 import { complain } from "../messages.js";
-import { html, into, mount, signal, useEffect, useRef, useState } from "./component.js";
+import { paced } from "../pacing.js";
+import { html, into, mount, signal, useEffect, useMemo, useRef, useState } from "./component.js";
 import { Select } from "./parts.js";
 import { visit } from "./visiting.js";
 import { useKnob } from "./knob.js";
@@ -17,7 +20,7 @@ const PAGES = [
   { name: "partitions", title: "What partitions and behaviour add" },
 ];
 const SETTLE_MILLISECONDS = 250;
-const POLL_MILLISECONDS = 700;
+const PACE_MILLISECONDS = 300;
 /** A whole range of a knob is dragged in so many pixels. */
 const DRAG_PIXELS = 240;
 const KEPT = "course-page";
@@ -105,32 +108,31 @@ function KnobNumber({ name, words }) {
  */
 function Runs({ name }) {
   const [course, setCourse] = useState(/** @type {any} */ (null));
-  const look = async () => {
-    try {
-      setCourse(await fetchJson("/api/course"));
-    } catch (error) {
-      complain(error);
-    }
-  };
-  const isGoing = ["queued", "running", "cancelling"].includes(course?.job?.state);
+  const look = useMemo(
+    () =>
+      paced(async () => {
+        try {
+          setCourse(await fetchJson("/api/course"));
+        } catch (error) {
+          complain(error);
+        }
+      }, PACE_MILLISECONDS),
+    [],
+  );
   useEffect(() => {
     look();
+    return askOnEach("course", look);
   }, [name]);
-  useEffect(() => {
-    if (!isGoing) return undefined;
-    const timer = setTimeout(look, POLL_MILLISECONDS);
-    return () => clearTimeout(timer);
-  }, [course]);
   const missing = (course?.runs ?? []).filter((/** @type {any} */ one) => !one.there);
   if (!missing.length) return null;
   const make = async () => {
     await post("/api/course").catch(complain);
-    await look();
+    look();
   };
   const share = course?.job?.total ? course.job.done / course.job.total : 0;
   return html`<div class="course-runs" role="status">
     ${
-      isGoing
+      isGoing(course?.job)
         ? html`<div>
             Making the course's runs: ${course.job.step ?? ""}
             <div class="long-progress"><i style=${`width: ${100 * share}%`}></i></div>

@@ -3,7 +3,7 @@
 // after Back.
 
 import { fetchJson, readOnly, remove } from "../api.js";
-import { listenToAll } from "../events.js";
+import { listenToAll, listenToGaps } from "../events.js";
 import { isGoing, shareOf, standing, timeLeft } from "../jobs.js";
 import { complain } from "../messages.js";
 import { paced } from "../pacing.js";
@@ -139,8 +139,9 @@ export function startWorkList() {
   if (!place) return;
   // The reports of a job have a step; the end of anything else may have begun or ended one.
   listenToAll((event) => {
-    if ("step" in event || event.type === "sessions") load();
+    if ("at" in event || event.type === "sessions") load();
   });
+  listenToGaps((isOpen) => isOpen && load());
   mount(place, html`<${WorkList} />`);
   load();
 }
