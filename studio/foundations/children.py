@@ -8,7 +8,6 @@ ends, and a parent hears of a child's death at once.
 """
 
 import contextlib
-import importlib
 import multiprocessing
 import os
 import pickle
@@ -81,7 +80,7 @@ class Child:
             )
         with contextlib.suppress(EndedError):
             self.send((_script() if knows_script else {}, finishes))
-            self.send((function.__module__, function.__qualname__, arguments))
+            self.send((function, arguments))
 
     @property
     def identifier(self) -> int:
@@ -177,8 +176,8 @@ def live(inbox_end: int, outbox_end: int, parent_end: int) -> None:
             process._inheriting = True
             spawn.prepare(script)
             del process._inheriting
-        module, name, arguments = inbox.recv()
-        getattr(importlib.import_module(module), name)(inbox, outbox, *arguments)
+        function, arguments = inbox.recv()
+        function(inbox, outbox, *arguments)
 
 
 def _end_with_parent(parent_end: int) -> None:

@@ -5,7 +5,6 @@ serves one file after another (a second one starts if two threads need it at onc
 """
 
 import contextlib
-import importlib
 import os
 import pickle
 import threading
@@ -43,10 +42,10 @@ def isolated(
     """
     if os.environ.get(INSIDE):
         return function(path, *([] if on_frame is None else [on_frame]), **options)
+    task = pickle.dumps((function, (path, *([] if on_frame is None else [report])), options))
     child, is_free = _CHILDREN.take(), False
-    task = (function.__module__, function.__qualname__, path, on_frame is not None, options)
     try:
-        kind, value = child.answer(pickle.dumps((_read, task, {})), on_frame or silent, SECONDS_OF_SILENCE)
+        kind, value = child.answer(task, on_frame or silent, SECONDS_OF_SILENCE)
         is_free = True
     except EndedError:
         raise wrong(f"'{path.name}' cannot be read: its reader crashed.", REMEDY) from None
@@ -117,9 +116,3 @@ def serve(inbox: Connection, outbox: Connection) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     serve_tasks(inbox, outbox)
-
-
-def _read(module: str, name: str, path: Path, with_frames: bool, options: dict[str, object]) -> object:
-    """The task: a reader by its name, and whether it takes what hears of each frame."""
-    function = getattr(importlib.import_module(module), name)
-    return function(path, *([report] if with_frames else []), **options)

@@ -134,9 +134,9 @@ class StudioServer:
         return [entry["text"] for entry in entries if entry["level"] == "error"]
 
     def worker(self) -> psutil.Process:
-        """The tracking process: the child that was spawned for it (multiprocessing's own helper is another)."""
+        """The tracking process."""
         children = psutil.Process(self.process.pid).children()
-        found = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+        found = [child for child in children if "studio-tracking" in child.cmdline()]
         assert len(found) == 1, [child.cmdline() for child in children]
         return found[0]
 

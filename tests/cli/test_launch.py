@@ -1,7 +1,6 @@
 """Opening and closing the whole: what is printed, what is refused, and that nothing is left running."""
 
 import logging
-import multiprocessing
 import os
 import re
 import signal
@@ -134,11 +133,11 @@ def test_lines_of_the_log_lose_their_token() -> None:
 
 
 def test_another_host_needs_permission_before_anything_starts(tmp_path: Path) -> None:
-    before = multiprocessing.active_children()
+    before = psutil.Process().children()
     with pytest.raises(AccessError, match=r"0\.0\.0\.0"):
         serve(tmp_path / "w", Listening("0.0.0.0", 0))
     assert not (tmp_path / "w").exists()
-    assert multiprocessing.active_children() == before
+    assert psutil.Process().children() == before
 
 
 def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:

@@ -220,9 +220,7 @@ class Served:
     def tracker(self) -> psutil.Process:
         """The tracking process."""
         found = [
-            one
-            for one in psutil.Process(self.process.pid).children()
-            if "spawn_main" in " ".join(one.cmdline())
+            one for one in psutil.Process(self.process.pid).children() if "studio-tracking" in one.cmdline()
         ]
         assert len(found) == 1, found
         return found[0]

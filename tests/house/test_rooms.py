@@ -24,7 +24,6 @@ BY_NAME = {
     "studio/__init__.py": "the studio's own verbs",
     "studio/extending.py": "what packages that add to the studio take",
     "studio/cli/main.py": "the command that was called",
-    "studio/foundations/isolated.py": "a function run in a child",
     "studio/search/likelihood/edge_region.py": "the card's kernels, of the same room",
     "studio/search/trackers/frame_loop.py": "the card's search, of the same room",
     "studio/garden/benchmarks/devices.py": "what is measured of a card, of the same room",

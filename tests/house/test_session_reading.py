@@ -29,7 +29,6 @@ OPENS_ITSELF = {
     "studio/results/export/bvh_writing.py": "an export, in a folder made for it",
     "studio/results/export/overlay_video.py": "an export, in a folder made for it",
     "studio/results/export/table_files.py": "an export, in a folder made for it",
-    "studio/foundations/isolated.py": "the pipes of its own processes",
     "studio/foundations/kernel_cache.py": "compiled kernels, which have checks of their own",
     "studio/runs/drawing/colour_tokens.py": "the package's own colours",
     "studio/results/self_contained.py": "the package's own pages",

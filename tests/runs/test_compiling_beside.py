@@ -1,19 +1,23 @@
 """What another process compiles is what a frame needs after its search; it does where something is missing."""
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from held_children import hold
 from sample_walk import copy_of_walk
 
 from studio.foundations import kernel_cache
+from studio.foundations.children import Child
 from studio.runs import compiling_beside
 from studio.runs.new_run import prepare_run
 from studio.sessions.stored_run import StoredRun
 
 FORMS = """
 import sys
+from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 from studio.operations.jobs.open_run import OpenRun
 from studio.runs import compiling_beside
@@ -28,8 +32,7 @@ def forms():
     return {(kernel.py_func.__name__, str(form)) for kernel in kernels for form in kernel.overloads}
 
 session, run = sys.argv[1:]
-compiling_beside._end_with_parent = lambda: None
-compiling_beside.compile_for(session, run)
+compiling_beside.compile_for(None, None, Path(session), run)
 before = forms()
 opened = OpenRun(session, f"{session}/runs/{run}")
 while not opened.tracking.done:
@@ -54,20 +57,17 @@ def test_all_that_follows_the_first_search_is_compiled(run: StoredRun) -> None:
     assert int(answer.stdout.split()[0]) >= 7
 
 
-def test_the_process_is_started_where_a_kernel_is_missing_and_ends_with_its_parent(
+def test_the_process_is_started_once_where_a_kernel_is_missing(
     run: StoredRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    started: list[subprocess.Popen[bytes]] = []
-    popen = subprocess.Popen
+    started: list[Child] = []
 
-    def start(*given: object, **options: object) -> subprocess.Popen[bytes]:
-        started.append(popen(*given, **options))  # pyright: ignore[reportArgumentType, reportCallIssue]
+    def start(_function: object, *_given: object, name: str, quiet: bool) -> Child:
+        started.append(Child(hold, name=name, quiet=quiet))
         return started[-1]
 
     monkeypatch.setattr(compiling_beside.numba, "get_num_threads", lambda: 2)
-    monkeypatch.setattr(compiling_beside.subprocess, "Popen", start)
-    waiting = "from studio.runs import compiling_beside; compiling_beside._end_with_parent()"
-    monkeypatch.setattr(compiling_beside, "COMMAND", waiting)
+    monkeypatch.setattr(compiling_beside, "Child", start)
     with compiling_beside.compiling_beside(run):
         pass
     assert not started
@@ -75,7 +75,7 @@ def test_the_process_is_started_where_a_kernel_is_missing_and_ends_with_its_pare
         kernel_cache._compiling()
         kernel_cache._compiling()
     (process,) = started
-    assert process.poll() is None
-    assert process.stdin is not None
-    process.stdin.close()
-    assert process.wait(60) == 0
+    assert process.exit_code is None
+    process.kill()
+    process.wait(60)
+    assert process.exit_code == -signal.SIGKILL

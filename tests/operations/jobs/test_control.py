@@ -297,7 +297,7 @@ def test_windows_that_start_different_runs_at_once_each_get_theirs(
     wait_for(watching, all_are_finished)
     assert all("is being tracked" in str(problem) for problem in refused)
     here = psutil.Process()
-    tracking = [child for child in here.children() if "spawn_main" in " ".join(child.cmdline())]
+    tracking = [child for child in here.children() if "studio-tracking" in child.cmdline()]
     assert len(tracking) == 1
 
 

@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
-from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
@@ -115,10 +114,10 @@ def test_a_script_that_its_processes_would_run_again_is_told_so(tmp_path: Path) 
 def test_a_process_that_cannot_be_started_is_waited_for_by_no_task(
     one: ProcessExecutor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(_: object) -> None:
+    def refuse(*_: object, **__: object) -> None:
         raise BlockingIOError("Resource temporarily unavailable")
 
-    monkeypatch.setattr(SpawnProcess, "start", refuse)
+    monkeypatch.setattr(subprocess, "Popen", refuse)
     for _ in range(2):
         assert isinstance(one.submit(identifier).exception(PATIENCE), BlockingIOError)
 
