@@ -165,9 +165,9 @@ class Job:
     @property
     def message(self) -> dict[str, object]:
         """How it stands, as an event: by `at` whoever follows it knows it, and asks for the same."""
-        state = self.state
-        head = {"type": self.kind.event, "run": "", "key": state.key, "at": self.kind.address(state)}
-        return head | state.model_dump(mode="json", by_alias=True)
+        state, kind = self.state, self.kind
+        head = {"type": kind.event, "run": "", "key": state.key, "at": kind.address(state)}
+        return {**head, **state.model_dump(mode="json", by_alias=True)}
 
     def change(self, **changes: object) -> None:
         """Replace entries of the state and report to all pages; from any thread."""
@@ -394,7 +394,7 @@ class JobRunner:
 def entries_of(state: SessionJob) -> dict[str, object]:
     """A state's entries; `run` is the one that a job made, where it made one."""
     entries = dict(state)
-    return entries | {"run": entries.get("made_run") or entries.get("run")}
+    return {**entries, "run": entries.get("made_run") or entries.get("run")}
 
 
 def _fill(address: str, state: SessionJob) -> str:
