@@ -67,14 +67,18 @@ def start_pose(session: Session) -> PoseView:
     return pose_view(body, pose, stored=own is not None, frame=session.start_pose_frame())
 
 
-def set_start_pose(session: Session, pose: list[float], frame: int | None = None) -> PoseView:
+def set_start_pose(
+    session: Session, pose: list[float], frame: int | None = None, *, body: BodyModel | None = None
+) -> PoseView:
     """Make a pose the session's start pose; the old one is kept beside it.
 
     frame : that it is of, None: as before.
+    body : whose pose it is, None: the session's.
 
-    Raises SettingsError for a pose that does not fit the body, RunError for a frame outside the footage.
+    Raises SettingsError for a pose that does not fit the body, RunError for another body than the session's or a frame
+    outside the footage.
     """
-    body = session.body()
+    body = body or session.body()
     keep_start_pose(session, body, checked_pose(body, pose, SettingsError), frame)
     return start_pose(session)
 

@@ -132,5 +132,5 @@ class _Alike:
     def fitness(self, poses: Array, stage: int = 0) -> Array:
         return np.zeros(len(poses))
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+    def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
         return np.ones(len(poses), np.bool_)

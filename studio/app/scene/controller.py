@@ -81,9 +81,9 @@ from studio.operations.jobs.events import (
     RunState,
     StateChanged,
 )
+from studio.operations.poses import set_start_pose
 from studio.runs.drawing.colour_tokens import ColourTokens, colour_tokens
 from studio.runs.setup.pose_search import BetterPose
-from studio.runs.setup.start_pose_file import keep_start_pose
 from studio.search.settings import all_knobs
 from studio.sessions.workspace import Workspace
 
@@ -325,10 +325,8 @@ class SceneController:
         """Make the edited pose the session's start pose."""
         if self.opened is None or model.edit is None:
             return model
-        session = self.opened.session
-        keep_start_pose(session, self.opened.body, model.edit.pose)
-        frame = session.start_pose_frame()
-        notify(self._server, "Start pose saved", f"New runs begin with it, in frame {frame}.")
+        kept = set_start_pose(self.opened.session, model.edit.pose.tolist(), body=self.opened.body)
+        notify(self._server, "Start pose saved", f"New runs begin with it, in frame {kept.frame}.")
         return edit_pose(model, saved)
 
     def refine_pose(self, model: Model) -> Model:

@@ -9,7 +9,8 @@ from numpy import float64
 from numpy.typing import NDArray
 
 from studio.foundations.errors import StudioError, WorkCancelledError
-from studio.runs.setup.pose_search import BetterPose, better_pose
+from studio.operations.poses import PoseSearch, improve_pose
+from studio.runs.setup.pose_search import BetterPose
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -40,7 +41,7 @@ class PoseRefining:
 
         def search() -> None:
             try:
-                result = better_pose(session, frame, pose, run=run, progress=report)
+                result = improve_pose(session, PoseSearch(frame, pose, run), report)
             except StudioError as problem:
                 result = problem
             except Exception:

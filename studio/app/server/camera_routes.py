@@ -19,7 +19,7 @@ from studio.app.server.app_state import App, AppState
 from studio.app.server.requests import Arguments, body_of
 from studio.app.server.safe_paths import folder_to_import
 from studio.app.server.schemas import Request, RunName
-from studio.footage.capture.camera_addresses import CameraAddress, camera_address
+from studio.footage.capture.camera_addresses import DEVICE
 from studio.foundations.errors import NotFoundError
 from studio.operations.jobs.camera_service import CamerasStanding, RecordingState
 from studio.operations.jobs.camera_tracking import LiveRecordingRequest
@@ -70,8 +70,8 @@ async def preview(request: CamerasRequest, http: HttpRequest, app: App) -> Camer
     """Open these cameras instead of those before. They close when they are not read for a while."""
     server = http.scope.get("server") or ("", 0)
     ports = {int(server[1] or 0), *(scene.port for scene in app.scenes.open_scenes().values())}
-    addresses = [_address(one, app) for one in request.cameras]
-    await asyncio.to_thread(app.cameras.open, addresses, ports)
+    cameras = [(one.name, _place(one.address.strip(), app)) for one in request.cameras]
+    await asyncio.to_thread(app.cameras.open, cameras, ports)
     return app.cameras.standing
 
 
@@ -122,16 +122,14 @@ def stop(app: App) -> RecordingState:
     return stopped
 
 
-def _address(camera: CameraRequest, app: AppState) -> CameraAddress:
-    """The address of a camera that a page names. Raises FootageError, PathRefused."""
-    text = camera.address.strip()
-    if "://" in text or text.startswith("/dev/"):
-        return camera_address(camera.name, text)
+def _place(text: str, app: AppState) -> str:
+    """Where a camera is that a page names, a video only where footage may be taken from. Raises PathRefused."""
+    if text.partition("://")[0] not in ("", text) or DEVICE.fullmatch(text):
+        return text
     path = Path(text).expanduser()
     if not path.is_absolute():
         raise PathRefused(
             f"'{text[:80]}' is no camera's address and no full path.",
             "Give http://…, rtsp://… or /dev/video0.",
         )
-    folder = folder_to_import(str(path.parent), app.footage_roots)
-    return camera_address(camera.name, str(folder / path.name), replays=True)
+    return str(folder_to_import(str(path.parent), app.footage_roots) / path.name)

@@ -469,10 +469,10 @@ class TimedFrameLikelihood:
         self.batches.append(poses.copy())
         return values
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+    def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """Whether the poses are possible, timed."""
         began = time.perf_counter()
-        possible = self.problem.feasible(poses, limbs_apart)
+        possible = self.problem.feasible(poses, limbs_apart=limbs_apart)
         self.priors_seconds += time.perf_counter() - began
         return possible
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, FiniteFloat
 
-from studio.footage.capture.camera_addresses import CameraAddress, without_own
+from studio.footage.capture.camera_addresses import camera_address, without_own
 from studio.footage.capture.live_cameras import CameraStanding, SpreadFigures
 from studio.footage.capture.stream_files import preview_jpeg
 from studio.foundations.errors import NotFoundError, RunError, StudioError
@@ -78,12 +78,15 @@ class CameraService:
         self._stop = threading.Event()
         self._after = 0.0
 
-    def open(self, addresses: Sequence[CameraAddress], own_ports: Collection[int] = ()) -> None:
-        """Look at these cameras instead of those before. own_ports : the studio's, where none of them is.
+    def open(self, cameras: Sequence[tuple[str, str]], own_ports: Collection[int] = ()) -> None:
+        """Look at these cameras instead of those before.
 
+        cameras : name in the calibration and address of each; whoever asks may read a video that is named.
+        own_ports : the studio's, where no camera is.
         Raises RunError while cameras are recorded, FootageError.
         """
         self._jobs.check_free(RECORDINGS)
+        addresses = [camera_address(name, place, replays=True) for name, place in cameras]
         kept_off = [without_own(address, own_ports) for address in addresses]
         readers = CameraReaders(kept_off) if kept_off else None
         with self._lock:

@@ -187,7 +187,7 @@ class InspectedFrame:
         # A tracker from outside the package may have no constraints; then every pose keeps its weight.
         knobs = asdict(self.of.settings(self.number, layer).tracker)
         if knobs.get("constraints", "ignore") != "ignore":
-            held = self.of.priors.hold(record.poses, knobs.get("limbs_apart", False))
+            held = self.of.priors.hold(record.poses, limbs_apart=knobs.get("limbs_apart", False))
             raw = np.where(held, raw, -np.inf) if held.any() else raw
         return normalised(raw, record.beta)
 

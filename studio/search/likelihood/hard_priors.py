@@ -67,19 +67,20 @@ class HardPriors:
         self.body = body
         self.limits = np.stack([body.lower, body.upper])
 
-    def hold(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+    def hold(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether every parameter lies within its limits, both included, and, if
         `limbs_apart`, no limb is inside another.
 
         Raises BodyError for poses that are no (N, D); False for a pose with a NaN or an infinity.
         """
-        return self._held(poses, self.limits, limbs_apart)
+        return self._held(poses, self.limits, limbs_apart=limbs_apart)
 
     def apart(self, poses: Array) -> NDArray[np.bool_]:
         """(N, D) finite poses to (N,) whether no limb is inside another, whatever the joints' limits."""
-        return self._held(poses, np.array([[-np.inf], [np.inf]]).repeat(self.limits.shape[1], axis=1), True)
+        anywhere = np.array([[-np.inf], [np.inf]]).repeat(self.limits.shape[1], axis=1)
+        return self._held(poses, anywhere, limbs_apart=True)
 
-    def _held(self, poses: Array, limits: Array, limbs_apart: bool) -> NDArray[np.bool_]:
+    def _held(self, poses: Array, limits: Array, *, limbs_apart: bool) -> NDArray[np.bool_]:
         poses, pairs = checked_poses(self.body, poses), limb_pairs(self.body)
         held = np.empty(len(poses), dtype=np.bool_)
         least = pairs.least if limbs_apart else pairs.least[:0]

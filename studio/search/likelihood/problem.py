@@ -51,7 +51,7 @@ class FrameLikelihood(Protocol):
         """(N, D) poses to (N,) the fitness f that a swarm maximises; the log-weight where there is no f."""
         ...
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+    def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether the body can take them: limits kept and, if `limbs_apart`, no limb inside
         another.
         """
@@ -93,9 +93,9 @@ class BaseFrameLikelihood(ABC):
         """
         return Shares((POOLED,), (WHOLE,), self.log_likelihood(poses)[:, None, None])
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+    def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether the body can take them."""
-        return self.priors.hold(poses, limbs_apart)
+        return self.priors.hold(poses, limbs_apart=limbs_apart)
 
 
 @runtime_checkable

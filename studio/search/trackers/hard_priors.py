@@ -64,7 +64,7 @@ def possible(problem: FrameLikelihood, poses: Array, rules: SearchSettings) -> M
     """(N,) whether a particle counts."""
     if rules.constraints == "ignore":
         return np.ones(len(poses), dtype=bool)
-    return problem.feasible(poses, rules.limbs_apart)
+    return problem.feasible(poses, limbs_apart=rules.limbs_apart)
 
 
 def clamped(space: SearchSpace, proposed: Proposals) -> Proposals:
@@ -83,18 +83,18 @@ def _redrawn(
     again: Callable[[Indices, int], Proposals],
 ) -> Proposals:
     """Impossible proposals drawn again at most `MOST_REDRAWS` times, then left where they came from."""
-    wrong = np.flatnonzero(~problem.feasible(proposed.poses, limbs_apart))
+    wrong = np.flatnonzero(~problem.feasible(proposed.poses, limbs_apart=limbs_apart))
     if not wrong.size:
         return proposed
     poses, velocities = proposed.poses.copy(), proposed.velocities.copy()
     for attempt in range(1, MOST_REDRAWS + 1):
         drawn = again(wrong, attempt)
-        good = problem.feasible(drawn.poses, limbs_apart)
+        good = problem.feasible(drawn.poses, limbs_apart=limbs_apart)
         poses[wrong[good]], velocities[wrong[good]] = drawn.poses[good], drawn.velocities[good]
         wrong = wrong[~good]
         if not wrong.size:
             return Proposals(poses, velocities)
-    if len(wrong) == len(poses) and not problem.feasible(came_from, limbs_apart).any():
+    if len(wrong) == len(poses) and not problem.feasible(came_from, limbs_apart=limbs_apart).any():
         return proposed
     poses[wrong], velocities[wrong] = came_from[wrong], 0.0
     return Proposals(poses, velocities)

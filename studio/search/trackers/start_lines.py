@@ -96,9 +96,9 @@ class AtEase:
         """(N,) the same."""
         return self.log_likelihood(poses, stage)
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+    def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N,) whether the body can take them."""
-        return self.problem.feasible(poses, limbs_apart)
+        return self.problem.feasible(poses, limbs_apart=limbs_apart)
 
 
 class LineSteps:
@@ -161,7 +161,7 @@ class LineSteps:
         drawn[far:, limb] = np.clip(line.pose[limb] + near, lower, upper)
         for place, other in enumerate(others):
             drawn[-1 - place, limb] = other.pose[limb]
-        drawn = drawn[self.problem.feasible(drawn, True)]
+        drawn = drawn[self.problem.feasible(drawn, limbs_apart=True)]
         return self._best_of(rng, line, drawn, count) if len(drawn) > 1 else line
 
     def _with_pair(
@@ -201,7 +201,7 @@ class LineSteps:
         return max(line, Line(drawn[best[0]], float(values[best[0]])), found, key=_value)
 
     def _impossible(self, poses: Array) -> Array:
-        return np.where(self.problem.feasible(poses, True), 0.0, IMPOSSIBLE)
+        return np.where(self.problem.feasible(poses, limbs_apart=True), 0.0, IMPOSSIBLE)
 
     def _count(self, evaluations: int) -> None:
         with self._counting:

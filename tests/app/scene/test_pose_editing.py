@@ -178,12 +178,12 @@ def test_refining_reports_shows_and_can_fail(
     better = swaying_pose(human, 1)
     requested: list[int] = []
 
-    def found(session, frame, pose, *, run, progress):
-        requested.append(frame)
+    def found(session, search, progress):
+        requested.append(search.frame)
         progress("searching", 1, 2)
         return SimpleNamespace(pose=better, gain=1.0, overlap_before=0.5, overlap=0.9)
 
-    monkeypatch.setattr(pose_refining, "better_pose", found)
+    monkeypatch.setattr(pose_refining, "improve_pose", found)
     press(tab_of(stage).refine)
     until(lambda: pose_is(stage, better))
     assert requested == [stage.shown.frame]
@@ -193,7 +193,7 @@ def test_refining_reports_shows_and_can_fail(
         raise StudioError("Nothing is to be seen.", "Choose another frame.")
 
     problems: list[StudioError] = []
-    monkeypatch.setattr(pose_refining, "better_pose", refused)
+    monkeypatch.setattr(pose_refining, "improve_pose", refused)
     stage._controller.refused = problems.append
     press(tab_of(stage).refine)
     until(lambda: problems)

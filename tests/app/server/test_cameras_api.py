@@ -116,6 +116,8 @@ def test_cameras_are_recorded_into_a_session(studio: Studio, streams: Streams) -
         ("concat:/etc/passwd|/etc/hosts", 422),
         ("/etc/passwd", 422),
         ("../etc/passwd", 422),
+        ("://etc/passwd", 422),
+        ("/dev/shm/somebody's.mp4", 422),
         ("/dev/sda", 422),
         ("http://169.254.169.254/latest", 422),
     ],

@@ -36,8 +36,8 @@ class NearMarkers:
     def fitness(self, poses: Array, stage: int = 0) -> Array:
         return self.log_likelihood(poses, stage)
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        return self.priors.hold(poses, limbs_apart)
+    def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        return self.priors.hold(poses, limbs_apart=limbs_apart)
 
     def error(self, pose: Array) -> float:
         return float(np.linalg.norm(marker_points(BODY, pose)[0] - self.wanted, axis=1).mean())

@@ -56,9 +56,9 @@ class Known:
         """(N, D) poses to (N,) the fitness that a swarm maximises."""
         return self.informed.fitness(poses, stage)
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+    def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether they are possible for the body."""
-        return self.informed.feasible(poses, limbs_apart)
+        return self.informed.feasible(poses, limbs_apart=limbs_apart)
 
 
 HIDDEN_SIDE, SPELL, NOISE_MM = "left", 30, 20.0

@@ -119,9 +119,9 @@ class AbsoluteAngles:
         """(N, D) poses to (N,) log-weights."""
         return self.problem.fitness(self.relative(poses), stage)
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+    def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether the body can take them."""
-        return self.problem.feasible(self.relative(poses), limbs_apart)
+        return self.problem.feasible(self.relative(poses), limbs_apart=limbs_apart)
 
 
 def links_before(body: BodyModel) -> NDArray[np.int64]:
