@@ -15,7 +15,7 @@ from studio.foundations.declaring import Web
 from studio.foundations.errors import NotFoundError, SessionError
 from studio.foundations.knobs import Knob, knobs_of
 from studio.foundations.progress import Progress, no_progress
-from studio.results.export.exporting import ExportReport, export_run, settled
+from studio.results.export.exporting import ExportReport, export_run, options_for
 from studio.results.export.formats import FORMATS, ExportFormat, format_of
 from studio.results.export.options import ExportOptions
 from studio.runs.setup.workflow import ExportedFile
@@ -117,7 +117,7 @@ def exports_of(run: StoredRun) -> RunExports:
 def requested_format(name: str, options: Mapping[str, object]) -> ExportFormat:
     """The format of a request. Raises ExportError, SettingsError for an unknown format or option."""
     form = format_of(name)
-    settled(form, options)
+    options_for(form, options)
     return form
 
 

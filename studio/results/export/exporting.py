@@ -1,4 +1,4 @@
-"""Exports of a run: options settled, the file written in a folder of its own, read back, and only then offered."""
+"""Exports of a run: options checked, the file written in a folder of its own, read back, and only then offered."""
 
 import dataclasses
 import os
@@ -45,8 +45,8 @@ class ExportReport:
         return sum(path.stat().st_size for path in self.files)
 
 
-def settled(form: ExportFormat, requested: Mapping[str, object]) -> ExportOptions:
-    """Options from the request, with "auto" resolved for the format.
+def options_for(form: ExportFormat, requested: Mapping[str, object]) -> ExportOptions:
+    """The options of an export of a format, as requested, with "auto" made what the format has.
 
     Raises SettingsError for unknown names and values, ExportError for an option that the format does not take, or an
     empty range of frames.
@@ -91,7 +91,7 @@ def export_run(
     requested : options by name. pack : several files become one zip.
     Raises ExportError, and the errors of reading the run.
     """
-    options = settled(form, requested)
+    options = options_for(form, requested)
     writer: Writer = form.write or plugged_in("scene-recorder")
     notes: tuple[str, ...] = ()
     if "track" in form.takes:

@@ -22,7 +22,7 @@ INTERPOLATED = "{count} of {all} frames are interpolated: this format cannot say
 class ExportTask:
     """One file to be written.
 
-    options : with "auto" settled.
+    options : with "auto" made what the format has.
     place : the file, in an empty folder of its own; more files may be written beside it.
     step(words, done, total) : to be called while it is written; raises WorkCancelledError.
     """

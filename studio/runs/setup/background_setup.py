@@ -258,7 +258,7 @@ def set_up_background(
         if strokes is not None:
             restore_strokes(session, had_strokes)
         with suppress(SessionError):
-            _with_footage(session, manifest.footage)
+            _put_back_footage(session, manifest.footage)
         if had_evidence:
             write_evidence(session, evidence)
         else:
@@ -395,15 +395,15 @@ class _SetUp:
     made: BackgroundSetup
     masks: dict[str, SampledMasks]
 
-    def restored(self, session: Session) -> Session:
-        """The session as the source left it."""
+    def put_back(self, session: Session) -> Session:
+        """Leave the session as the source left it."""
         write_evidence(session, self.evidence)
-        return _with_footage(session, self.manifest.footage)
+        return _put_back_footage(session, self.manifest.footage)
 
 
-def _with_footage(session: Session, footage: FootageSource) -> Session:
-    """The session as it is now, with its footage described so. Raises SessionError where others have changed more of
-    that than its masks and backgrounds: theirs stays.
+def _put_back_footage(session: Session, footage: FootageSource) -> Session:
+    """Describe the footage of the session, as it is now, so. Raises SessionError where others have changed more of that
+    than its masks and backgrounds: theirs stays.
     """
     now = Session(session.path)
     if _filmed(now.manifest.footage) != _filmed(footage):
@@ -450,18 +450,18 @@ def _set_up_best(session: Session, wanted: _Wanted, progress: Progress) -> Backg
     used = set(choice.by_camera.values())
     if len(used) == 1:
         best = tried[used.pop()]
-        best.restored(session)
+        best.put_back(session)
         notes.append(f"The best one is {best.made.source}.")
         return dataclasses.replace(best.made, notes=(*notes, *best.made.notes), choice=choice)
     by_source = {source: [name for name, one in choice.by_camera.items() if one == source] for source in used}
     with made_masks(session, CHOSEN_MASKS) as made:
         for source in sorted(used):
-            left = tried[source].restored(session)
+            left = tried[source].put_back(session)
             every = range(session.manifest.frame_count)
             for frame, view in _views_of(left, every, by_source[source], progress):
                 made.put(view.camera, frame, view.mask)
         # The masks that came with the footage are those of the session as it was found.
-        _with_footage(session, manifest.footage)
+        _put_back_footage(session, manifest.footage)
         write_evidence(session, evidence)
     own: dict[str, Knob] = {"background_model": MASK_SOURCES["best"].model}
     now = Session(session.path)

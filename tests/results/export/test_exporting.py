@@ -20,7 +20,7 @@ from studio.foundations.errors import (
 from studio.foundations.knobs import knobs_of
 from studio.foundations.registry import PlugInError
 from studio.operations.exports import discard_export, export_into_run, kept_exports, kept_file
-from studio.results.export.exporting import export_run, settled
+from studio.results.export.exporting import export_run
 from studio.results.export.formats import FORMATS, format_of_file
 from studio.results.export.naming import joint_names, name_map
 from studio.results.export.options import ExportOptions
@@ -45,9 +45,9 @@ def test_every_option_belongs_to_some_format_and_every_format_is_written() -> No
 
 
 def test_auto_becomes_what_the_format_expects() -> None:
-    assert (settled(FORMATS["trc"], {}).unit, settled(FORMATS["trc"], {}).up) == ("m", "y")
-    assert (settled(FORMATS["c3d"], {}).unit, settled(FORMATS["c3d"], {}).up) == ("mm", "z")
-    assert settled(FORMATS["bvh"], {"unit": "cm"}).unit == "cm"
+    assert (options_for(FORMATS["trc"], {}).unit, options_for(FORMATS["trc"], {}).up) == ("m", "y")
+    assert (options_for(FORMATS["c3d"], {}).unit, options_for(FORMATS["c3d"], {}).up) == ("mm", "z")
+    assert options_for(FORMATS["bvh"], {"unit": "cm"}).unit == "cm"
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_auto_becomes_what_the_format_expects() -> None:
 )
 def test_wrong_options_are_refused(name: str, requested: dict, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
-        settled(FORMATS[name], requested)
+        options_for(FORMATS[name], requested)
 
 
 def test_an_unknown_ending_names_the_formats() -> None:
