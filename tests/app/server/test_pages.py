@@ -32,6 +32,7 @@ GUIDE_PAGES = (
     "glossary",
     "figures",
     "reproduction",
+    "by-hand",
 )
 
 

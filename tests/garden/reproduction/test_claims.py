@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 import studio.garden.reproduction
-from studio.garden.reproduction.claims import EQUAL, FEWEST_SEEDS, LOWER, NO_WORSE, percent, ratio
+from studio.garden.reproduction.claims import EQUAL, FEWEST_SEEDS, LOWER, NO_WORSE, percent, ratio, saved
+from studio.garden.reproduction.experiment import TABLE, Experiment
+from studio.results.comparison.statistics import number
+from studio.results.comparison.trials import Scale
 
 THEIRS = np.random.default_rng(7).normal(30.0, 0.5, 10)
 
@@ -37,6 +40,36 @@ def test_few_seeds_show_no_equality(claim: str) -> None:
     assert verdict(1.3, claim, FEWEST_SEEDS - 1) == "not reproduced"
 
 
+def test_no_saving_is_refuted_by_a_saving_as_by_a_loss() -> None:
+    about_one = [0.98, 1.0, 1.02, 1.01, 0.99]
+    assert saved("saved", about_one, 1.0).verdict == "reproduced"
+    for factor in (0.7, 1.4):
+        assert saved("saved", [factor * one for one in about_one], 1.0).verdict == "not reproduced"
+    assert saved("saved", [2.0 * one for one in about_one], 2.0).verdict == "reproduced"
+    assert saved("saved", [3.0 * one for one in about_one], 2.0).verdict == "better"
+    assert saved("saved", about_one[1:], 1.0).verdict == "undecided"
+    assert saved("saved", about_one, None).verdict == "answered"
+
+
+@pytest.mark.parametrize("better", ["", "lower"])
+def test_no_experiment_finds_a_printed_value_again_by_a_few_seeds(better: str) -> None:
+    def verdict(seeds: int) -> str:
+        experiment = Experiment(
+            **TABLE["fleischmann-table-2"],
+            name="few",
+            trials=lambda scale: (),
+            measure=lambda arguments, cache: {},
+            shown=lambda outcomes: [
+                number("error", [38.0 + seed / 10 for seed in range(seeds)], "mm", 38.0, better)
+            ],
+        )
+        assert experiment.trials(Scale((0,))) == ()
+        return experiment.conclude(()).verdict
+
+    assert verdict(FEWEST_SEEDS) == "reproduced"
+    assert verdict(FEWEST_SEEDS - 1) == "undecided"
+
+
 def test_all_of_a_few_cases_leave_an_interval() -> None:
     found = percent("right", [True] * 68, 90.0)
     assert (found.ours, found.high, found.seeds, found.verdict) == (100.0, 100.0, 68, "better")
@@ -47,14 +80,40 @@ def test_all_of_a_few_cases_leave_an_interval() -> None:
     assert percent("right", [True, False]).verdict == "answered"
 
 
+MILLIMETRES = "tracking.py"
+"""Its means and worst frames are printed in mm, of which fewer are better."""
+
+
 def test_every_ratio_of_an_experiment_is_judged_there() -> None:
     """No module compares two settings by a rule of its own, one-sided or of few seeds."""
     folder = Path(studio.garden.reproduction.__file__).parent
+    seen: set[str] = set()
     for path in folder.rglob("*.py"):
-        called = {
-            getattr(node.func, "attr", getattr(node.func, "id", ""))
+        if path.name == "claims.py":
+            continue
+        calls = [
+            node
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
             if isinstance(node, ast.Call)
-        }
-        if path.name != "claims.py":
-            assert not called & {"ratio_number", "verdict_of"}, path
+        ]
+        assert not {called(node) for node in calls} & {"ratio_number", "verdict_of"}, path
+        beside = {id(entry) for node in calls if called(node) == "beside" for entry in node.args}
+        one_sided = [
+            node
+            for node in calls
+            if called(node) == "number" and id(node) not in beside and is_one_sided(node)
+        ]
+        seen |= {path.name for _ in one_sided}
+    assert seen == {MILLIMETRES}
+
+
+def called(call: ast.Call) -> str:
+    return getattr(call.func, "attr", getattr(call.func, "id", ""))
+
+
+def is_one_sided(call: ast.Call) -> bool:
+    """Whether a call of `number` gives it a paper's value and a better side."""
+    given = {keyword.arg for keyword in call.keywords}
+    names = ("name", "values", "unit", "paper", "better", "statistic")
+    given |= set(names[: len(call.args)])
+    return {"paper", "better"} <= given

@@ -45,10 +45,10 @@ def test_everything_is_written_and_nothing_is_run_twice(tmp_path: Path) -> None:
     assert len({line.split()[0] for line in lines(log)}) == 2
     assert steps[-1] == ("toy: " + steps[-1][0].removeprefix("toy: "), 4, 4)
     document = first.documents[0]
-    assert document["verdict"] == "reproduced"
+    assert document["verdict"] == "undecided"
     assert document["firm"] is False
     assert "not firm: 2 seeds" in document["notes"][0]
-    assert [number["verdict"] for number in document["numbers"]] == ["reproduced", "better", "answered"]
+    assert [number["verdict"] for number in document["numbers"]] == ["undecided", "better", "answered"]
     assert document["numbers"][2]["ours"] is None
     assert read_findings(out, "toy") == document
     assert json.loads((out / "results.json").read_text())["experiments"] == [document]
@@ -102,7 +102,7 @@ def test_a_failing_trial_fails_its_experiment_only(
     log, out = tmp_path / "log", tmp_path / "out"
     found = run([toy("bad", log, seed1=deed), toy("good", tmp_path / "log2")], out)
     bad, good = found.documents
-    assert (bad["verdict"], good["verdict"]) == ("failed", "reproduced")
+    assert (bad["verdict"], good["verdict"]) == ("failed", "undecided")
     assert found.failed == len(failed)
     assert [failure["label"] for failure in bad["failures"]] == failed
     assert reason in bad["failures"][0]["reason"]
@@ -115,14 +115,14 @@ def test_failed_trials_run_again_and_outcomes_are_kept(tmp_path: Path) -> None:
     run([toy("bad", log, seed1="once refused")], out)
     found = run([toy("bad", log, seed1="once refused")], out)
     assert (found.measured, found.kept, found.failed) == (2, 2, 0)
-    assert found.documents[0]["verdict"] == "reproduced"
+    assert found.documents[0]["verdict"] == "undecided"
 
 
 @pytest.mark.slow
 def test_a_process_that_dies_once_is_replaced(tmp_path: Path) -> None:
     log = tmp_path / "log"
     found = run([toy("toy", log, seed1="die once")], tmp_path / "out")
-    assert found.documents[0]["verdict"] == "reproduced"
+    assert found.documents[0]["verdict"] == "undecided"
     assert len(lines(log)) == 5
 
 
@@ -184,7 +184,7 @@ def test_an_unknown_recipe_fails_its_experiment_only(tmp_path: Path) -> None:
     found = run(
         [toy("bad", tmp_path / "log", footage=("nowhere",)), toy("good", tmp_path / "log")], tmp_path / "out"
     )
-    assert [document["verdict"] for document in found.documents] == ["failed", "reproduced"]
+    assert [document["verdict"] for document in found.documents] == ["failed", "undecided"]
     assert "There is no recipe 'nowhere'." in found.documents[0]["words"]
 
 
