@@ -30,16 +30,16 @@ def _toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_stranger_sees_what_there_is_and_what_was_found(tmp_path: Path) -> None:
     assert "toy-good  (not run yet)" in call("reproduce list").stdout
     found = call("reproduce toy-good --seeds 2 --processes 1")
-    assert "toy-good: reproduced, not firm" in found.stdout
+    assert "toy-good: undecided, not firm" in found.stdout
     assert "error, plain: 40." in found.stdout
     assert "4 trials run, 0 kept from before, 0 failed." in found.stdout
     report = workspace_root() / "reproduction" / "report.html"
     assert f"Report: {report}" in found.stdout
     assert report.is_file()
-    assert "toy-good  (reproduced, not firm)" in call("reproduce list").stdout
+    assert "toy-good  (undecided, not firm)" in call("reproduce list").stdout
     listed = answer_of("reproduce list")["experiments"]
     assert [(line["name"], line["verdict"]) for line in listed] == [
-        ("toy-good", "reproduced"),
+        ("toy-good", "undecided"),
         ("toy-bad", None),
     ]
 
@@ -88,5 +88,5 @@ def test_findings_go_into_the_guide_with_commits_that_exist(
     call("reproduce", *wanted, "--out", tmp_path / "anew")
     written = json.loads((guide / "toy-good.json").read_text())
     assert written["commits"] == ["0123456789ab"]
-    assert written["verdict"] == "reproduced"
+    assert written["verdict"] == "undecided"
     assert any(line.startswith("error, plain: 40.") for line in written["lines"])
