@@ -20,7 +20,7 @@ from studio.foundations.errors import (
 from studio.foundations.knobs import knobs_of
 from studio.foundations.registry import PlugInError
 from studio.operations.exports import discard_export, export_into_run, kept_exports, kept_file
-from studio.results.export.exporting import export_run
+from studio.results.export.exporting import export_run, options_for
 from studio.results.export.formats import FORMATS, format_of_file
 from studio.results.export.naming import joint_names, name_map
 from studio.results.export.options import ExportOptions
