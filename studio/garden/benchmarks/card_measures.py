@@ -136,7 +136,10 @@ def searching(
 
     def search() -> None:
         now = side_by_side.begin(
-            start, [Moment(run, 1, 1 << 31) for run in range(runs)], settings.particles, space.sigma
+            start,
+            [Moment(run, 1, 1 << 31) for run in range(runs)],
+            settings.particles,
+            np.tile(space.sigma, (runs, 1)),
         )
         for layer, plan in enumerate(plans):
             assert plan is not None

@@ -1,9 +1,10 @@
 """A comparison run until all of its trials are done: outcomes are kept one by one and not measured again."""
 
+import json
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from studio.foundations.errors import RunError, StudioError, WorkCancelledError
@@ -17,7 +18,7 @@ from studio.results.comparison.kept_comparison import KeptComparison, trial_key
 from studio.results.comparison.kept_trials import KeptOutcome, measured_by, plain
 from studio.results.comparison.plan import Comparison, Plan, conclude, trials
 from studio.results.comparison.sweep import Sweep, conclude_sweep, run_name, sweep_trials
-from studio.results.comparison.tracked import measure_tracking
+from studio.results.comparison.tracked import TrackingTrial, measure_seeds, measure_tracking, seeds_at_once
 from studio.results.comparison.trials import Outcome, Trial, TrialJob
 from studio.sessions.manifest import now
 from studio.sessions.object_stores import above
@@ -145,23 +146,52 @@ def _measure(
     """The outcomes of all trials, in their order; missing ones are measured."""
     work = _Work.of(kept.plan(session))
     outcomes = _outcomes(kept, work)
-    jobs = [_job(kept, work, key) for key in work.trials if key not in outcomes]
+    missing = [_job(kept, work, key) for key in work.trials if key not in outcomes]
+    groups = {group[0].key: group for group in _side_by_side(missing, processes or cores())}
     report("", len(outcomes), len(work.trials))
 
-    def on_result(job: TrialJob, result: TrialResult) -> None:
+    def on_result(first: TrialJob, result: TrialResult) -> None:
         if result.measured is None:
             raise RunError(
-                f"{job.label} could not be tracked: {result.failure}", "Change what it says and try again."
+                f"{first.label} could not be tracked: {result.failure}", "Change what it says and try again."
             )
-        outcome = KeptOutcome(
-            result.measured, "", result.seconds, measured_by(), now(), job.label, job.arguments
-        )
-        kept.kept_trials.write(job.key, outcome)
-        outcomes[job.key] = Outcome(work.trials[job.key], result.measured)
-        report(job.label, len(outcomes), len(work.trials))
+        group = groups[first.key]
+        measured = [result.measured] if len(group) == 1 else result.measured["measured"]
+        for job, values in zip(group, measured, strict=True):
+            seconds = result.seconds / len(group)
+            outcome = KeptOutcome(values, "", seconds, measured_by(), now(), job.label, job.arguments)
+            kept.kept_trials.write(job.key, outcome)
+            outcomes[job.key] = Outcome(work.trials[job.key], values)
+            report(job.label, len(outcomes), len(work.trials))
 
+    jobs = [_as_one(group) for group in groups.values()]
     run_jobs(jobs, above(work.plan.footage), on_result, processes, executor=executor, checkpoint=checkpoint)
     return work.plan, [outcomes[key] for key in work.trials]
+
+
+def _side_by_side(jobs: Sequence[TrialJob], processes: int) -> list[list[TrialJob]]:
+    """The jobs in groups: those of tracking trials that differ by seed alone and that a card searches side by side."""
+    alike = dict[str, list[TrialJob]]()
+    for job in jobs:
+        alike.setdefault(json.dumps({**job.arguments, "seed": None}, sort_keys=True), []).append(job)
+    groups = list[list[TrialJob]]()
+    for seeds in alike.values():
+        most = 1
+        if seeds[0].measure is measure_tracking:
+            most = seeds_at_once(TrackingTrial.of_plain(seeds[0].arguments), len(seeds), processes)
+        groups += [seeds[first : first + most] for first in range(0, len(seeds), most)]
+    places = {job.key: place for place, job in enumerate(jobs)}
+    return sorted(groups, key=lambda group: places[group[0].key])
+
+
+def _as_one(group: Sequence[TrialJob]) -> TrialJob:
+    """The job that measures a group."""
+    first = group[0]
+    if len(group) == 1:
+        return first
+    arguments = {"trials": [job.arguments for job in group]}
+    label = f"{first.label} and {len(group) - 1} more"
+    return replace(first, label=label, arguments=arguments, measure=measure_seeds)
 
 
 def _job(kept: KeptComparison, work: _Work, key: str) -> TrialJob:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
@@ -23,21 +23,25 @@ from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.trials import Trial, kept_as
 from studio.results.evaluation.errors import evaluate, rows_of_frames
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
-from studio.runs.live.following import Following
+from studio.runs.live.following import Following, step_together
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.setup.shape_on_the_way import WEIGHTING, shaped_body
 from studio.runs.sides import known_silhouettes
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.behaviour.model_file import read_model
 from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.edge_region import CPU
 from studio.search.likelihood.hard_priors import HardPriors
 from studio.search.settings import RunSettings, changed_settings, default_settings
+from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_refinement import FrameRefiner
 from studio.search.trackers.refinement import Distances
 from studio.search.trackers.side_exchange import with_sides_right
 from studio.search.trackers.tracker import LayerRecord, start_of
 from studio.sessions.session import Session
 
+SEEDS_AT_ONCE, POSES_AT_ONCE = 64, 200_000
+"""Most seeds, and most poses of a layer of all of them, that a card searches side by side."""
 AS_PUBLISHED: Mapping[str, Any] = {"refine_frames": False}
 """Knobs without refinement, as in the papers; a trial that refines sets them."""
 
@@ -90,7 +94,8 @@ class Tracked:
 
     frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
     lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
-    search (weighting and tracker), without reading and preparing pictures. named : per frame the limbs that the tracker
+    search (weighting and tracker), without reading and preparing pictures; its share where seeds were tracked side by
+    side. named : per frame the limbs that the tracker
     itself reported lost, as in a run's timeline. impossible_frames : frames whose pose breaks a hard prior (a joint
     beyond its limits, a limb inside another); -1 in outcomes that were kept before it was counted.
     """
@@ -130,13 +135,26 @@ def track(
 
     Raises TruthError for a footage without truth and what tracking raises.
     """
+    return track_seeds(trial, (trial.seed,), cache, on_layer=on_layer, spoilt=spoilt)[0]
+
+
+def track_seeds(
+    trial: TrackingTrial,
+    seeds: Sequence[int],
+    cache: FootageCache,
+    *,
+    on_layer: Callable[[LayerRecord], None] | None = None,
+    spoilt: Changed = UNCHANGED,
+) -> list[Tracked]:
+    """As `track` with each of the seeds, a frame of all at a time, side by side where a card searches it. Each has the
+    poses that it has alone.
+    """
     session = cache.session(trial.footage)
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
     subject = read_subject(session.path / trial.subject, session.manifest.body) if trial.subject else None
     body = session.body(trial.body or None, subject)
-    changes = {**AS_PUBLISHED, **trial.changes}
-    settings = changed_settings(default_settings(trial.tracker, trial.weighting), changes)
+    settings = settings_of(trial)
     cameras, fps = _cameras(session, trial.cameras), session.manifest.fps
     seen_with, rate = spoilt.cameras(cameras), fps / trial.every
     count = session.manifest.frame_count
@@ -154,41 +172,48 @@ def track(
         of_shape = partial(evidence, name=WEIGHTING)
         shaped = shaped_body(body, seen_with, of_shape, first, np.array(start), sigma)
         body, start = shaped.body, tuple(float(value) for value in shaped.start)
-    following = Following(
-        settings,
-        search_space(
-            body,
-            session_sigma(session, body, rate) * trial.sigma_scale,
-            _behaviour(session, body, settings, trial),
-        ),
-        start_of(start),
-        trial.seed,
-        FrameRefiner(body, seen_with, trial.seed),
-        on_layer,
-    )
+    sigma = session_sigma(session, body, rate) * trial.sigma_scale
+    space = search_space(body, sigma, _behaviour(session, body, settings, trial))
+    runs = [
+        Following(settings, space, start_of(start), seed, FrameRefiner(body, seen_with, seed), on_layer)
+        for seed in seeds
+    ]
     likelihood = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)
-    seconds, evaluations, named = 0.0, 0, list[list[str]]()
+    seconds, evaluations, named = 0.0, 0, [list[list[str]]() for _ in runs]
     for number, frame in enumerate(frames):
         seen = evidence(frame)
         began = time.perf_counter()
-        result = following.step(frame, likelihood.problem(seen), seen)
-        evaluations = result.evaluations
-        named.append(list(result.limbs_lost))
+        results = step_together(runs, frame, likelihood.problem(seen), seen)
         seconds += time.perf_counter() - began if number else 0.0
+        evaluations = results[0].evaluations
+        for lost, result in zip(named, results, strict=True):
+            lost.append(list(result.limbs_lost))
         report("tracking", number + 1, len(frames))
-    poses = np.array(following.poses)
-    if settings.refinement.refine_frames:
+    found: list[Tracked] = []
+    for run, lost in zip(runs, named, strict=True):
+        poses = np.array(run.poses)
+        if settings.refinement.refine_frames:
 
-        def silhouettes_of(frame: int) -> Mapping[str, Distances]:
-            row = frames.index(frame)
-            return known_silhouettes(body, seen_with, evidence(frame), poses[row], following.memories[row])
+            def silhouettes_of(
+                frame: int, run: Following = run, poses: Array = poses
+            ) -> Mapping[str, Distances]:
+                row = frames.index(frame)
+                return known_silhouettes(body, seen_with, evidence(frame), poses[row], run.memories[row])
 
-        poses = with_sides_right(body, seen_with, np.array(frames), poses, rate, silhouettes_of)[0]
-    figures = measured(session, body, poses, np.array(frames), evaluations, seconds)
-    by_frame = dict(zip(frames, named, strict=True))
-    impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())
-    named_of = [by_frame[frame] for frame in figures.frames]
-    return dataclasses.replace(figures, named=named_of, impossible_frames=impossible)
+            poses = with_sides_right(body, seen_with, np.array(frames), poses, rate, silhouettes_of)[0]
+        figures = measured(session, body, poses, np.array(frames), evaluations, seconds / len(runs))
+        by_frame = dict(zip(frames, lost, strict=True))
+        impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())
+        named_of = [by_frame[frame] for frame in figures.frames]
+        found.append(dataclasses.replace(figures, named=named_of, impossible_frames=impossible))
+    return found
+
+
+def settings_of(trial: TrackingTrial) -> RunSettings:
+    """The settings that a trial tracks with."""
+    return changed_settings(
+        default_settings(trial.tracker, trial.weighting), {**AS_PUBLISHED, **trial.changes}
+    )
 
 
 def measured(
@@ -279,3 +304,30 @@ def tracking_trial(group: str, trial: TrackingTrial) -> Trial:
 def measure_tracking(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Track; the fields of `Tracked`."""
     return asdict(track(TrackingTrial.of_plain(arguments), cache))
+
+
+def seeds_at_once(trial: TrackingTrial, seeds: int, processes: int) -> int:
+    """How many of a trial's seeds a card searches side by side, 1 where none does.
+
+    processes : that track at once. What the processor refines is left to all of them.
+    """
+    if trial.changes.get("device", CPU) == CPU or trial.behaviour:
+        return 1
+    settings, tracker = settings_of(trial), TRACKERS[trial.tracker]
+    poses = tracker.evaluations(settings.tracker) // tracker.layer_count(settings.tracker)
+    most = min(max(POSES_AT_ONCE // poses, 1), SEEDS_AT_ONCE)
+    return min(most, -(-seeds // processes)) if settings.refinement.refine_frames else most
+
+
+@kept_as("tracking_trials.measure_seeds")
+def measure_seeds(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Track trials that differ by seed alone side by side: `measured`, the fields of each one's `Tracked`.
+
+    arguments : `trials`, those of each. Where they fail together, they are tracked one by one.
+    """
+    trials = [TrackingTrial.of_plain(one) for one in arguments["trials"]]
+    try:
+        found = track_seeds(trials[0], [trial.seed for trial in trials], cache)
+    except Exception:
+        found = [track(trial, cache) for trial in trials]
+    return {"measured": [asdict(one) for one in found]}

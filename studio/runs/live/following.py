@@ -1,7 +1,7 @@
 """Consecutive frames searched one after the other in memory: a run without store, events and recovery."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -14,7 +14,7 @@ from studio.runs.run_behaviour import learner_of
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.settings import RunSettings
 from studio.search.trackers.catalogue import TRACKERS
-from studio.search.trackers.frame_loop import search_frame
+from studio.search.trackers.frame_loop import FrameSearch, search_together
 from studio.search.trackers.frame_refinement import FrameRefiner, space_after
 from studio.search.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord, SearchSpace
 
@@ -50,23 +50,30 @@ class Following:
 
     def step(self, frame: int, problem: FrameLikelihood, seen: FrameEvidence | None = None) -> FrameResult:
         """Search a frame. seen : its masks, if it is to be refined."""
+        return step_together((self,), frame, problem, seen)[0]
+
+    def search_of(self, frame: int) -> FrameSearch:
+        """The search of the next frame, from what the last one left."""
         settings, number, space = self.settings, len(self.poses), self.space
         if self._learner is not None:
             space = dataclasses.replace(space, behaviour=self.model)
             self.carried = self._learner.carried_into(number, self.carried, self._poses_so_far)
         if self.refiner is not None:
             space = space_after(space, self.carried, settings.refinement)
-        result = search_frame(
+        return FrameSearch(
             TRACKERS[settings.tracker_name],
-            problem,
             self.carried,
             space,
             seed=self.seed,
             frame=frame,
-            settings_source=lambda: (1, settings.tracker),
             repeats=1 if number else settings.tracker.start_repeats,
-            on_layer=self.on_layer,
         )
+
+    def conclude(
+        self, result: FrameResult, problem: FrameLikelihood, seen: FrameEvidence | None = None
+    ) -> FrameResult:
+        """The result of a frame's search, refined, and kept for the next frame."""
+        settings, frame = self.settings, result.frame
         if self.refiner is not None and seen is not None:
             silhouettes = partial(silhouettes_by_camera, seen)
             result = self.refiner.refined(result, silhouettes, problem, settings.refinement)
@@ -83,3 +90,16 @@ class Following:
             np.array(known[:count]) for known in (self.poses, self.log_weights, self.overlaps)
         )
         return poses, log_weights, overlaps
+
+
+def step_together(
+    runs: Sequence[Following], frame: int, problem: FrameLikelihood, seen: FrameEvidence | None = None
+) -> list[FrameResult]:
+    """Search a frame for runs of the same settings, side by side where a card does it; each has the result that it has
+    alone. seen : as in `Following.step`.
+    """
+    first = runs[0]
+    results = search_together(
+        [run.search_of(frame) for run in runs], problem, lambda: (1, first.settings.tracker), first.on_layer
+    )
+    return [run.conclude(result, problem, seen) for run, result in zip(runs, results, strict=True)]

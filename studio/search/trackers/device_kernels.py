@@ -372,15 +372,20 @@ def spread(centres, moments, root, dials, keys, limits, count, poses):
         poses[d, at] = np.float32(min(max(drawn, limits[0, d]), limits[1, d]))
 
 
-def take_rows(poses, weights, annealed, run, count, step, found, values):
-    """Every step-th particle of a run, then the heaviest: poses (K, D) and what they weigh (2, K), for the host."""
-    row = cuda.grid(1)
-    if row >= found.shape[0]:
+def take_rows(poses, weights, annealed, count, step, found, values):
+    """Every step-th particle of each run, then its heaviest: poses (R, K, D) and what they weigh (2, R, K), for the
+    host.
+    """
+    here = cuda.grid(1)
+    rows = found.shape[1]
+    if here >= found.shape[0] * rows:
         return
+    run = here // rows
+    row = here - run * rows
     number = np.int64(row) * step
-    if row == found.shape[0] - 1:
+    if row == rows - 1:
         number = np.int64(annealed[run, BEST])
     at = run * count + number
-    for d in range(found.shape[1]):
-        found[row, d] = poses[d, at]
-    values[FITNESS, row], values[LOG_WEIGHT, row] = weights[FITNESS, at], weights[LOG_WEIGHT, at]
+    for d in range(found.shape[2]):
+        found[run, row, d] = poses[d, at]
+    values[FITNESS, run, row], values[LOG_WEIGHT, run, row] = weights[FITNESS, at], weights[LOG_WEIGHT, at]

@@ -77,20 +77,19 @@ class DeviceRuns:
         weights: Any,  # noqa: ANN401
         numbers: Any,  # noqa: ANN401
         count: int,
-        run: int,
         step: int,
     ) -> tuple[Array, Array, Array]:
-        """Every step-th of a run's `count` particles (K, D), what these weigh (2, K), and the best (D,), which numbers
-        (R, 5) name.
+        """Every step-th of each run's `count` particles (R, K, D), what these weigh (2, R, K), and the best (R, D),
+        which numbers (R, 5) name.
         """
         rows = -(-count // step) + 1
-        taken = self._memory("rows", (rows, len(self.space.names)), np.float64)
-        values = self._memory("values", (2, rows), np.float64)
-        kernel("take_rows")[-(-rows // THREADS), THREADS, self._stream](
-            poses, weights, numbers, run, count, step, taken, values
+        taken = self._memory("rows", (self.runs, rows, len(self.space.names)), np.float64)
+        values = self._memory("values", (2, self.runs, rows), np.float64)
+        kernel("take_rows")[-(-self.runs * rows // THREADS), THREADS, self._stream](
+            poses, weights, numbers, count, step, taken, values
         )
         kept = self._fetched(taken)
-        return kept[:-1], np.ascontiguousarray(self._fetched(values)[:, :-1]), kept[-1]
+        return kept[:, :-1], self._fetched(values)[:, :, :-1], kept[:, -1]
 
     def _copied(self, name: str, values: NDArray[Any]) -> Any:  # noqa: ANN401
         there = self._memory(name, values.shape, values.dtype.type)

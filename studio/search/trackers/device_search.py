@@ -104,16 +104,16 @@ class DeviceFilter(DeviceRuns):
         last: DeviceSet,
         moments: Sequence[Moment],
         count: int,
-        sigma: Array,
+        sigmas: Array,
         carry: str = "weighted",
         systematic: bool = True,
         shift: Array | None = None,
     ) -> DeviceSet:
         """The set of `count` particles a run that a frame's first layer weighs: the last frame's, moved by shift (R, D)
-        and spread by sigma (D,) (Eq. 9, 10). carry : how the last frame's are taken.
+        and spread by sigmas (R, D) (Eq. 9, 10). carry : how the last frame's are taken.
         """
         size, whole = len(self.space.names), self.runs * count
-        keys, dials = self._uploaded(moments, [LayerPlan(1.0, Noise(sigma))] * self.runs)
+        keys, dials = self._uploaded(moments, [LayerPlan(1.0, Noise(sigma)) for sigma in sigmas])
         moved = self._copied("shift", np.zeros((self.runs, size)) if shift is None else shift)
         carried = self._memory("carried", (size, whole), np.float32)
         poses = self._next_poses(count)
@@ -176,48 +176,52 @@ class DeviceFilter(DeviceRuns):
         weighed = DeviceSet(given.poses, count, cumulated, weights, annealed)
         return weighed, weighed if noise is None else DeviceSet(poses, count)
 
-    def record(self, weighed: DeviceSet, plan: LayerPlan, layer: int, run: int = 0) -> LayerRecord:
-        """The record of a run's layer, which `step` has just done with what was measured."""
-        count, is_last = weighed.count, plan.noise is None
+    def records(self, weighed: DeviceSet, plans: Sequence[LayerPlan], layer: int) -> list[LayerRecord]:
+        """The records of all runs' layer, which `step` has just done."""
+        count, is_last = weighed.count, plans[0].noise is None
         step = -(-count // RECORDED)
-        given = weighed.poses, weighed.weights, weighed.annealed, count
-        poses, values, best = self._rows(*given, run, step)
-        annealed = self._fetched(weighed.annealed)[run]
-        found = self._fetched(self._moments)[:, run]
+        poses, values, best = self._rows(weighed.poses, weighed.weights, weighed.annealed, count, step)
+        annealed, found = self._fetched(weighed.annealed), self._fetched(self._moments)
         parents = np.zeros((2, 0), dtype=np.int64)
         if not is_last:
-            everyones = self._fetched(self._memory("parents", (2, self.runs * count), np.int32))
-            parents = everyones[:, run * count : (run + 1) * count].astype(np.int64)
-        kept = found[WEIGHTED + 1]
-        return LayerRecord(
-            layer=layer,
-            beta=float(annealed[BETA]),
-            alpha_wanted=plan.survival,
-            alpha_reached=float(annealed[SURVIVAL]),
-            variance_weighed=found[WEIGHED + 1],
-            variance_resampled=kept if is_last else found[SURVIVING + 1],
-            variance_diffused=kept if is_last else found[DIFFUSED + 1],
-            best=best,
-            best_log_weight=float(annealed[MOST]),
-            mean=found[WEIGHTED],
-            poses=poses,
-            log_weights=values[LOG_WEIGHT],
-            parents=parents,
-            rows=np.arange(0, count, step) if step > 1 else np.zeros(0, dtype=np.int64),
-        )
-
-    def give(self, there: DeviceSet, run: int = 0) -> ParticleSet:
-        """A run's particles on the host, with their weights where they have been weighed."""
-        if there.weights is None:
-            first = run * there.count
-            poses = self._fetched(there.poses)[:, first : first + there.count]
-            return ParticleSet(
-                np.ascontiguousarray(poses.T, np.float64), np.full(there.count, -math.log(there.count))
+            parents = self._fetched(self._memory("parents", (2, self.runs * count), np.int32)).astype(
+                np.int64
             )
-        poses, values, _ = self._rows(there.poses, there.weights, there.annealed, there.count, run, 1)
-        beta, _, most, total, _ = self._fetched(there.annealed)[run]
-        raw = values[LOG_WEIGHT]
-        return ParticleSet(poses, -beta * (most - raw) - math.log(total), raw)
+        rows = np.arange(0, count, step) if step > 1 else np.zeros(0, dtype=np.int64)
+        kept = found[WEIGHTED + 1]
+        return [
+            LayerRecord(
+                layer=layer,
+                beta=float(annealed[run, BETA]),
+                alpha_wanted=plan.survival,
+                alpha_reached=float(annealed[run, SURVIVAL]),
+                variance_weighed=found[WEIGHED + 1, run],
+                variance_resampled=kept[run] if is_last else found[SURVIVING + 1, run],
+                variance_diffused=kept[run] if is_last else found[DIFFUSED + 1, run],
+                best=best[run],
+                best_log_weight=float(annealed[run, MOST]),
+                mean=found[WEIGHTED, run],
+                poses=poses[run],
+                log_weights=values[LOG_WEIGHT, run],
+                parents=parents if is_last else parents[:, run * count : (run + 1) * count],
+                rows=rows,
+            )
+            for run, plan in enumerate(plans)
+        ]
+
+    def give(self, there: DeviceSet) -> list[ParticleSet]:
+        """All runs' particles on the host, with their weights where they have been weighed."""
+        if there.weights is None:
+            equal = np.full(there.count, -math.log(there.count))
+            poses = np.split(self._fetched(there.poses).T.astype(np.float64), self.runs)
+            return [ParticleSet(np.ascontiguousarray(own), equal) for own in poses]
+        poses, values, _ = self._rows(there.poses, there.weights, there.annealed, there.count, 1)
+        given = list[ParticleSet]()
+        for own, raw, (beta, _, most, total, _) in zip(
+            poses, values[LOG_WEIGHT], self._fetched(there.annealed), strict=True
+        ):
+            given.append(ParticleSet(own, -beta * (most - raw) - math.log(total), raw))
+        return given
 
     def means(self) -> Array:
         """(R, D) weighted means (Eq. 8) of the layer last done, where it was measured."""
@@ -238,66 +242,77 @@ class DeviceFilter(DeviceRuns):
 
 
 class DeviceSearch:
-    """One frame's search on a device, a layer at a time, for `frame_loop`. evaluated : poses that the last one
-    weighed.
+    """Searches of one frame on a device, a layer at a time, for `frame_loop`. evaluated : poses of each that the last
+    layer weighed.
     """
 
     def __init__(
         self,
         tracker: ParticleFilter[Any],
         problem: ProblemOnDevice,
-        space: SearchSpace,
+        spaces: Sequence[SearchSpace],
         settings: Any,  # noqa: ANN401
     ) -> None:
-        """settings : those that the frame begins with."""
+        """spaces : of the runs, which differ in σ0 alone. settings : those that the frame begins with."""
         self.evaluated = 0
-        self._tracker, self._space = tracker, space
+        self._tracker, self._spaces = tracker, spaces
         self._problem = problem
         by_limbs = getattr(settings, "crossover_by", "limbs") == "limbs"
-        self._filter = DeviceFilter(problem.device, space, 1, by_limbs, settings.constraints == "clamp")
+        clamped = settings.constraints == "clamp"
+        self._filter = DeviceFilter(problem.device, spaces[0], len(spaces), by_limbs, clamped)
         self._set: DeviceSet | None = None
-        self._extra: Arrays = {}
+        self._extras = list[Arrays]()
 
-    def begin(self, previous: FilterState, numbers: RandomNumbers, settings: Any) -> None:  # noqa: ANN401
-        """Make the first layer's set from what the last frame left."""
-        last = previous.particles
-        assert last is not None
-        self._extra = last.extra
-        start = previous.estimate if settings.dynamics != "none" else None
-        shift = (
-            None
-            if start is None or previous.previous_estimate is None
-            else (start - previous.previous_estimate)[None]
-        )
+    def begin(
+        self,
+        previous: Sequence[FilterState],
+        numbers: Sequence[RandomNumbers],
+        settings: Any,  # noqa: ANN401
+    ) -> None:
+        """Make the first layer's sets from what the last frame left."""
+        last = [one.particles for one in previous if one.particles is not None]
+        self._extras = [one.extra for one in last]
+        shifts = np.zeros((len(last), len(self._spaces[0].names)))
+        for shift, one in zip(shifts, previous, strict=True):
+            now, before = one.estimate, one.previous_estimate
+            if settings.dynamics != "none" and now is not None and before is not None:
+                shift[:] = now - before
         self._set = self._filter.begin(
-            self._filter.take([last]),
-            [Moment(*numbers.key)],
+            self._filter.take(last),
+            [Moment(*one.key) for one in numbers],
             settings.particles,
-            self._space.sigma * settings.diffusion_scale,
+            np.array([space.sigma for space in self._spaces]) * settings.diffusion_scale,
             getattr(settings, "carry", "resampled"),
             settings.resampling == "systematic",
-            shift,
+            shifts,
         )
 
-    def take(self, particles: ParticleSet) -> None:
-        """Go on from a set of the host."""
-        self._set, self._extra = self._filter.take([particles]), particles.extra
+    def take(self, sets: Sequence[ParticleSet]) -> None:
+        """Go on from sets of the host."""
+        self._set, self._extras = self._filter.take(sets), [one.extra for one in sets]
 
-    def step(self, layer: int, numbers: RandomNumbers, settings: Any) -> LayerRecord:  # noqa: ANN401
-        """Do a layer and return its record."""
+    def step(self, layer: int, numbers: Sequence[RandomNumbers], settings: Any) -> list[LayerRecord]:  # noqa: ANN401
+        """Do a layer and return its records."""
         assert self._set is not None
-        plan = self._tracker.plan_layer(layer, self._space, settings, self._extra)
-        assert plan is not None
-        weighed, self._set = self._filter.step(
-            self._set, self._problem, [Moment(*numbers.key)], [plan], settings.resampling == "systematic"
-        )
+        plans = list[LayerPlan]()
+        for space, extra in zip(self._spaces, self._extras, strict=True):
+            plan = self._tracker.plan_layer(layer, space, settings, extra)
+            assert plan is not None
+            plans.append(plan)
+        moments, systematic = [Moment(*one.key) for one in numbers], settings.resampling == "systematic"
+        weighed, self._set = self._filter.step(self._set, self._problem, moments, plans, systematic)
         self.evaluated = weighed.count
-        record = self._filter.record(weighed, plan, layer)
-        self._extra = self._tracker.kept_of_layer(self._extra, record, settings)
-        return record
+        records = self._filter.records(weighed, plans, layer)
+        self._extras = [
+            self._tracker.kept_of_layer(extra, record, settings)
+            for extra, record in zip(self._extras, records, strict=True)
+        ]
+        return records
 
-    def particles(self) -> ParticleSet:
-        """The set that the next layer weighs, or the last layer's with its weights, on the host."""
+    def particles(self) -> list[ParticleSet]:
+        """The sets that the next layer weighs, or the last layer's with their weights, on the host."""
         assert self._set is not None
-        there = self._filter.give(self._set)
-        return ParticleSet(there.poses, there.log_weights, there.raw_log_weights, self._extra)
+        return [
+            ParticleSet(there.poses, there.log_weights, there.raw_log_weights, extra)
+            for there, extra in zip(self._filter.give(self._set), self._extras, strict=True)
+        ]

@@ -193,53 +193,58 @@ class DeviceSwarm(DeviceRuns):
         )  # fmt: skip
         return weighed, weighed if following is given else following
 
-    def record(self, weighed: DeviceSwarmSet, layer: int, *, is_last: bool, run: int = 0) -> LayerRecord:
-        """The record of a run's layer, which `step` has just done."""
+    def records(self, weighed: DeviceSwarmSet, layer: int, *, is_last: bool) -> list[LayerRecord]:
+        """The records of all runs' layer, which `step` has just done."""
         count = weighed.count
         every = -(-count // RECORDED)
-        given = weighed.places, weighed.weights, weighed.standing, count
-        poses, values, best = self._rows(*given, run, every)
-        found = self._fetched(self._moments)[:, run]
-        return LayerRecord(
-            layer=layer,
-            variance_weighed=found[WEIGHED + 1],
-            variance_resampled=found[SURVIVING + 1],
-            variance_diffused=found[(SURVIVING if is_last else DIFFUSED) + 1],
-            best=best,
-            best_log_weight=float(self._fetched(weighed.standing)[run, MOST]),
-            mean=found[WEIGHED],
-            poses=poses,
-            log_weights=values[weighed.row],
-            rows=np.arange(0, count, every) if every > 1 else np.zeros(0, dtype=np.int64),
+        poses, values, best = self._rows(weighed.places, weighed.weights, weighed.standing, count, every)
+        found, standing = self._fetched(self._moments), self._fetched(weighed.standing)
+        rows = np.arange(0, count, every) if every > 1 else np.zeros(0, dtype=np.int64)
+        return [
+            LayerRecord(
+                layer=layer,
+                variance_weighed=found[WEIGHED + 1, run],
+                variance_resampled=found[SURVIVING + 1, run],
+                variance_diffused=found[(SURVIVING if is_last else DIFFUSED) + 1, run],
+                best=best[run],
+                best_log_weight=float(standing[run, MOST]),
+                mean=found[WEIGHED, run],
+                poses=poses[run],
+                log_weights=values[weighed.row, run],
+                rows=rows,
+            )
+            for run in range(self.runs)
+        ]
+
+    def give(self, there: DeviceSwarmSet, freedom: Array) -> list[ParticleSet]:
+        """All runs' swarms on the host, with their values where they have been weighed. freedom : (D,) of the stage."""
+        arrays = there.places, there.velocities, there.bests, there.leaders, there.starts
+        places, velocities, bests, leaders, starts = (
+            np.split(self._fetched(array).T.astype(np.float64), self.runs) for array in arrays
         )
-
-    def give(self, there: DeviceSwarmSet, freedom: Array, run: int = 0) -> ParticleSet:
-        """A run's swarm on the host, with its values where it has been weighed. freedom : (D,) of its stage."""
-        own = slice(run * there.count, (run + 1) * there.count)
-
-        def rows(array: Any, columns: slice) -> Array:  # noqa: ANN401
-            return np.ascontiguousarray(self._fetched(array)[:, columns].T, np.float64)
-
-        reached, standing = self._fetched(there.reached)[:, own], self._fetched(there.standing)[run]
-        one = slice(run, run + 1)
-        swarm = unweighted(
-            rows(there.places, own),
-            {
-                VELOCITIES: rows(there.velocities, own),
-                BEST_POSES: rows(there.bests, own),
-                BEST_VALUES: np.ascontiguousarray(reached[VALUE]),
-                BEST_POSSIBLE: reached[POSSIBLE] > 0.0,
-                LEADER: rows(there.leaders, one)[0],
-                LEADER_VALUE: standing[[VALUE]],
-                LEADER_POSSIBLE: standing[[POSSIBLE]] > 0.0,
-                START: rows(there.starts, one)[0],
-                FREEDOM: freedom,
-            },
-        )
-        if there.weights is None:
-            return swarm
-        values = np.ascontiguousarray(self._fetched(there.weights)[there.row, own])
-        return ParticleSet(swarm.poses, swarm.log_weights, values, swarm.extra)
+        reached = np.split(self._fetched(there.reached), self.runs, axis=1)
+        standing = self._fetched(there.standing)
+        none = np.zeros((2, 0))
+        values = none if there.weights is None else self._fetched(there.weights)
+        weighed = np.split(values[there.row], self.runs)
+        given = list[ParticleSet]()
+        for run in range(self.runs):
+            swarm = unweighted(
+                np.ascontiguousarray(places[run]),
+                {
+                    VELOCITIES: np.ascontiguousarray(velocities[run]),
+                    BEST_POSES: np.ascontiguousarray(bests[run]),
+                    BEST_VALUES: np.ascontiguousarray(reached[run][VALUE]),
+                    BEST_POSSIBLE: reached[run][POSSIBLE] > 0.0,
+                    LEADER: leaders[run][0],
+                    LEADER_VALUE: standing[run, [VALUE]],
+                    LEADER_POSSIBLE: standing[run, [POSSIBLE]] > 0.0,
+                    START: starts[run][0],
+                    FREEDOM: freedom,
+                },
+            )
+            given.append(ParticleSet(swarm.poses, swarm.log_weights, weighed[run], swarm.extra))
+        return given
 
     def _sample(self, following: DeviceSwarmSet, keys: Any, dials: Any, constraints: str) -> None:  # noqa: ANN401
         """Launch the sampling of swarms about their leaders."""
@@ -287,69 +292,75 @@ class DeviceSwarm(DeviceRuns):
 
 
 class DeviceSearch:
-    """One frame's search on a device, an iteration at a time, for `frame_loop`. evaluated : poses that the last one
-    weighed.
+    """Searches of one frame on a device, an iteration at a time, for `frame_loop`. evaluated : poses of each that the
+    last one weighed.
     """
 
     def __init__(
-        self, tracker: ParticleSwarm, problem: ProblemOnDevice, space: SearchSpace, settings: SwarmSettings
+        self,
+        tracker: ParticleSwarm,
+        problem: ProblemOnDevice,
+        spaces: Sequence[SearchSpace],
+        settings: SwarmSettings,
     ) -> None:
+        """spaces : of the runs, which differ in σ0 alone."""
         self.evaluated = 0
-        self._space, self._problem = space, problem
-        self._swarm = DeviceSwarm(problem.device, space)
+        self._spaces, self._problem = spaces, problem
+        self._swarm = DeviceSwarm(problem.device, spaces[0], len(spaces))
         self._set: DeviceSwarmSet | None = None
-        self._freedom = np.ones(len(space.names))
+        self._freedom = np.ones(len(spaces[0].names))
 
-    def begin(self, previous: FilterState, numbers: RandomNumbers, settings: SwarmSettings) -> None:
-        """Sample the first stage's swarm about x̂."""
-        first = stages_of(self._space.hierarchy, settings)[0]
+    def begin(
+        self, previous: Sequence[FilterState], numbers: Sequence[RandomNumbers], settings: SwarmSettings
+    ) -> None:
+        """Sample the first stage's swarms about x̂."""
+        first = stages_of(self._spaces[0].hierarchy, settings)[0]
         self._freedom = first.freedom
-        start = expected_pose(previous, settings)
-        self._set = self._swarm.sample(
-            start[None],
-            [Moment(*numbers.key)],
-            first.particles,
-            [self._sampling(settings)],
-            settings.constraints,
-        )
+        starts = np.array([expected_pose(one, settings) for one in previous])
+        moments = [Moment(*one.key) for one in numbers]
+        samples = self._sampling(settings)
+        self._set = self._swarm.sample(starts, moments, first.particles, samples, settings.constraints)
 
-    def take(self, particles: ParticleSet) -> None:
-        """Go on from a swarm of the host."""
-        self._set, self._freedom = self._swarm.take([particles]), particles.extra[FREEDOM]
+    def take(self, sets: Sequence[ParticleSet]) -> None:
+        """Go on from swarms of the host."""
+        self._set, self._freedom = self._swarm.take(sets), sets[0].extra[FREEDOM]
 
-    def step(self, layer: int, numbers: RandomNumbers, settings: SwarmSettings) -> LayerRecord:
-        """Do an iteration and return its record."""
+    def step(
+        self, layer: int, numbers: Sequence[RandomNumbers], settings: SwarmSettings
+    ) -> list[LayerRecord]:
+        """Do an iteration and return its records."""
         assert self._set is not None
-        stages = stages_of(self._space.hierarchy, settings)
+        stages = stages_of(self._spaces[0].hierarchy, settings)
         now = moment_of(stages, layer)
         stage = stages[now.number]
         trunk_first = seen_in(stage, self._freedom) == TRUNK_FIRST
         steps, sampled = None, 0
         if now.iteration < stage.iterations:
             c = acceleration(now.iteration + 1, stage.iterations, settings.c_first, settings.c_last)
-            steps = [SwarmStep(self._sampling(settings).sigma, c)]
+            steps = [SwarmStep(one.sigma, c) for one in self._sampling(settings)]
         elif now.number + 1 < len(stages):
             following = stages[now.number + 1]
             self._freedom, sampled = following.freedom, following.particles
-            steps = [self._sampling(settings)]
+            steps = self._sampling(settings)
         weighed, self._set = self._swarm.step(
             self._set,
             self._problem,
-            [Moment(*numbers.key)],
+            [Moment(*one.key) for one in numbers],
             steps,
             constraints=settings.constraints,
             trunk_first=trunk_first,
             sampled=sampled,
         )
         self.evaluated = weighed.count
-        return self._swarm.record(weighed, layer, is_last=steps is None)
+        return self._swarm.records(weighed, layer, is_last=steps is None)
 
-    def particles(self) -> ParticleSet:
-        """The swarm that the next iteration weighs, or the last one's with its values, on the host."""
+    def particles(self) -> list[ParticleSet]:
+        """The swarms that the next iteration weighs, or the last one's with their values, on the host."""
         assert self._set is not None
         return self._swarm.give(self._set, self._freedom)
 
-    def _sampling(self, settings: SwarmSettings) -> SwarmStep:
-        """The sample of a swarm with this stage's freedom."""
-        sigma = self._space.sigma * settings.diffusion_scale * self._freedom
-        return SwarmStep(sigma, moving=settings.start_velocity == "uniform")
+    def _sampling(self, settings: SwarmSettings) -> list[SwarmStep]:
+        """The samples of swarms with this stage's freedom."""
+        moving = settings.start_velocity == "uniform"
+        factor = settings.diffusion_scale * self._freedom
+        return [SwarmStep(space.sigma * factor, moving=moving) for space in self._spaces]

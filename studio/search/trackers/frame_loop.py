@@ -9,7 +9,7 @@ settings, wherever it was interrupted.
 import dataclasses
 import importlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +65,23 @@ class SearchState:
     memory: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class NextLayer:
+    """What a layer is done with.
+
+    version : of the settings. held : the settings when the search began. in_use : those of the layer. count : layers of
+    a search. repeat, layer : numbers of search and layer, from 0. numbers : the layer's random numbers.
+    """
+
+    version: int
+    held: Any
+    in_use: Any
+    count: int
+    repeat: int
+    layer: int
+    numbers: RandomNumbers
+
+
 class FrameSearch:
     """The search of one frame. Call `step` until `finished`, then `result`.
 
@@ -86,15 +103,25 @@ class FrameSearch:
         self.tracker, self.previous, self.space = tracker, previous, space
         self.seed, self.frame, self.repeats = seed, frame, repeats
         self._state = state or SearchState()
-        self._on_device: SearchOnDevice | None = None
+        self.on_device: SearchOnDevice | None = None
+        """On the card, with its particles, those of all searches that are stepped together."""
+        self._place = 0
+        """Its number among these."""
         self._prepared: tuple[FrameLikelihood, int, FrameLikelihood] | None = None
 
     @property
     def state(self) -> SearchState:
         """All that is needed to go on elsewhere; particles that are on a card are copied now."""
-        if self._on_device is not None and self._state.particles is None:
-            self._state = dataclasses.replace(self._state, particles=self._on_device.particles())
+        if self.is_only_there:
+            assert self.on_device is not None
+            there = self.on_device.particles()[self._place]
+            self._state = dataclasses.replace(self._state, particles=there)
         return self._state
+
+    @property
+    def is_only_there(self) -> bool:
+        """Whether its particles are on a card and nowhere else."""
+        return self.on_device is not None and self._state.particles is None
 
     @property
     def problem(self) -> FrameLikelihood | None:
@@ -117,38 +144,83 @@ class FrameSearch:
 
         Knobs that take effect with the next frame keep the value they had when the search began.
         """
+        return step_together((self,), problem, version, settings)[0]
+
+    def next_layer(self, version: int, settings: Any) -> NextLayer:  # noqa: ANN401
+        """What the next layer is done with. Raises RunError where none is left."""
         if self.finished:
             raise RunError(f"Frame {self.frame} has no layer left.", "Continue with the next frame.")
-        began = time.perf_counter()
         state = self._state
         held = state.settings if state.layers_done else settings
         in_use = held_over(settings, held)
         count = self.tracker.layer_count(in_use)
         repeat, layer = divmod(state.layers_done, count)
-        record = self._step_on_device(problem, repeat, layer, in_use)
-        particles, expected = None, state.expected
-        memory: Mapping[str, Array] = self.previous.memory
-        if record is None:
-            particles, expected, record, memory = self._step_here(problem, repeat, layer, in_use)
-        evaluated = len(record.poses) if self._on_device is None else self._on_device.evaluated
-        is_last = state.layers_done + 1 == self.repeats * count
-        milliseconds = 1000.0 * (time.perf_counter() - began)
+        numbers = RandomNumbers(self.seed, self.frame, state.layers_done, repeat)
+        return NextLayer(version, held, in_use, count, repeat, layer, numbers)
+
+    def step_here(self, problem: FrameLikelihood, at: NextLayer) -> LayerRecord:
+        """Do the next layer by the processor, which goes on from what a card has done."""
+        began = time.perf_counter()
+        state = self.state
+        self.on_device = None
+        particles, expected = state.particles, state.expected
+        if at.layer == 0:
+            particles = self.beginning(at)
+            expected = self._expected(particles, at.in_use)
+        assert particles is not None
+        informed = problem if expected is None else self._with_expectations(problem, at.repeat, expected)
+        try:
+            following, record = self.tracker.step_layer(
+                at.numbers, particles, at.layer, informed, self.space, at.in_use
+            )
+        except WeightError as error:
+            raise WeightError(
+                f"Frame {self.frame}, layer {state.layers_done + 1}: {error.message}", error.hint
+            ) from None
+        is_last = state.layers_done + 1 == self.repeats * at.count
+        memory: Mapping[str, Array] = self._remembered(informed, following, at.in_use) if is_last else {}
+        return self._done(at, record, len(record.poses), began, 1, following, expected, memory)
+
+    def stepped_there(
+        self, problem: FrameLikelihood, at: NextLayer, record: LayerRecord, began: float, place: int, of: int
+    ) -> LayerRecord:
+        """The record of a layer that a card has done since `began`, of the search with number `place` of so many."""
+        assert self.on_device is not None
+        self._place, self._prepared = place, (problem, at.repeat, problem)
+        is_last = self._state.layers_done + 1 == self.repeats * at.count
+        memory: Mapping[str, Array] = self.previous.memory if is_last else {}
+        evaluated = self.on_device.evaluated
+        return self._done(at, record, evaluated, began, of, None, self._state.expected, memory)
+
+    def _done(
+        self,
+        at: NextLayer,
+        record: LayerRecord,
+        evaluated: int,
+        began: float,
+        of: int,
+        particles: ParticleSet | None,
+        expected: Array | None,
+        memory: Mapping[str, Array],
+    ) -> LayerRecord:
+        """The record, with the state brought up to date. of : how many searches share the time since it began."""
+        state, milliseconds = self._state, 1000.0 * (time.perf_counter() - began) / of
         self._state = SearchState(
             layers_done=state.layers_done + 1,
-            layer_count=count,
+            layer_count=at.count,
             particles=particles,
-            settings=held,
-            settings_version=version,
+            settings=at.held,
+            settings_version=at.version,
             evaluations=state.evaluations + evaluated,
             milliseconds=state.milliseconds + milliseconds,
             expected=expected,
-            memory=memory if is_last else {},
+            memory=memory,
         )
         return dataclasses.replace(
             record,
             frame=self.frame,
             layer=state.layers_done,
-            settings_version=version,
+            settings_version=at.version,
             milliseconds=milliseconds,
         )
 
@@ -172,110 +244,19 @@ class FrameSearch:
             carried=FilterState(state.particles, estimate.pose, self.previous.estimate, state.memory),
         )
 
-    def _step_here(
-        self,
-        problem: FrameLikelihood,
-        repeat: int,
-        layer: int,
-        settings: Any,  # noqa: ANN401
-    ) -> tuple[ParticleSet, Array | None, LayerRecord, Mapping[str, Array]]:
-        """A layer by the processor: the set that follows, the poses that the search expected, the record, and the
-        memory for the next frame where this is the last layer.
-        """
-        state = self.state
-        particles, expected = state.particles, state.expected
-        if layer == 0:
-            particles = self._beginning(repeat, settings)
-            expected = self._expected(particles, settings)
-        assert particles is not None
-        informed = problem if expected is None else self._with_expectations(problem, repeat, expected)
-        numbers = RandomNumbers(self.seed, self.frame, state.layers_done, repeat)
-        try:
-            following, record = self.tracker.step_layer(
-                numbers, particles, layer, informed, self.space, settings
-            )
-        except WeightError as error:
-            raise WeightError(
-                f"Frame {self.frame}, layer {state.layers_done + 1}: {error.message}", error.hint
-            ) from None
-        is_last = state.layers_done + 1 == self.repeats * self.tracker.layer_count(settings)
-        return (
-            following,
-            expected,
-            record,
-            self._remembered(informed, following, settings) if is_last else {},
-        )
-
-    def _step_on_device(
-        self,
-        problem: FrameLikelihood,
-        repeat: int,
-        layer: int,
-        settings: Any,  # noqa: ANN401
-    ) -> LayerRecord | None:
-        """A layer by a card, on which the particles stay; None where the processor is to do it.
-
-        Raises StudioError where a card that was asked for fails.
-        """
-        state = self._state
-        there = problem.on_device() if isinstance(problem, WeighedOnDevice) else None
-        if there is None or not self._fits_device(layer, settings):
-            # The processor goes on from what the card has done.
-            self._state, self._on_device = self.state, None
-            return None
-        try:
-            on_device = self._on_device
-            if on_device is None or layer == 0:
-                on_device = self._begun_on_device(there, repeat, layer, settings)
-            numbers = RandomNumbers(self.seed, self.frame, state.layers_done, repeat)
-            record = on_device.step(layer, numbers, settings)
-            self._on_device = on_device
-        except StudioError:
-            raise
-        except Exception as error:
-            assert isinstance(problem, WeighedOnDevice)
-            problem.give_up_device(error)
-            if layer > 0 and state.particles is None:
-                raise RunError(
-                    f"The card failed in layer {layer + 1} of frame {self.frame}: {error}.",
-                    "Track the frame again; the processor searches it.",
-                ) from None
-            self._on_device = None
-            return None
-        self._prepared = problem, repeat, problem
-        return record
-
-    def _begun_on_device(
-        self,
-        there: "ProblemOnDevice",
-        repeat: int,
-        layer: int,
-        settings: Any,  # noqa: ANN401
-    ) -> SearchOnDevice:
-        """A card's search with the set that a layer weighs."""
-        module = importlib.import_module(self.tracker.device_module)
-        on_device: SearchOnDevice = module.DeviceSearch(self.tracker, there, self.space, settings)
-        start = self.previous if repeat == 0 else FilterState(self.state.particles)
-        particles = self.state.particles
-        if layer > 0 and particles is not None:
-            on_device.take(particles)
-        elif start.particles is None:
-            on_device.take(self._beginning(repeat, settings))
-        else:
-            on_device.begin(start, RandomNumbers.of_beginning(self.seed, self.frame, repeat), settings)
-        return on_device
-
-    def _fits_device(self, layer: int, settings: Any) -> bool:  # noqa: ANN401
-        """Whether a card can do a layer."""
+    def fits_device(self, at: NextLayer) -> bool:
+        """Whether a card can do the next layer."""
         extra = self._state.particles.extra if self._state.particles is not None else {}
-        fits = self.tracker.fits_device(layer, self.space, settings, extra)
+        fits = self.tracker.fits_device(at.layer, self.space, at.in_use, extra)
         return fits and len(self.space.names) <= WIDEST
 
-    def _beginning(self, repeat: int, settings: Any) -> ParticleSet:  # noqa: ANN401
-        """The unweighted set of a search's first layer."""
-        numbers = RandomNumbers.of_beginning(self.seed, self.frame, repeat)
-        start = self.previous if repeat == 0 else FilterState(self.state.particles)
-        return self.tracker.begin_frame(numbers, start, self.space, settings)
+    def start(self, at: NextLayer) -> FilterState:
+        """What the search starts from: what the last frame left, or the search before."""
+        return self.previous if at.repeat == 0 else FilterState(self.state.particles)
+
+    def beginning(self, at: NextLayer) -> ParticleSet:
+        """The unweighted set of the search's first layer."""
+        return self.tracker.begin_frame(at.numbers.beginning, self.start(at), self.space, at.in_use)
 
     def _expected(self, particles: ParticleSet, settings: Any) -> Array:  # noqa: ANN401
         """(S, D) poses expected by a search that starts from these particles: the tracker's; after
@@ -333,13 +314,95 @@ def search_frame(
     settings_source : called before every layer, gives (version, tracker settings). on_layer : gets each record.
     """
     search = FrameSearch(tracker, previous, space, seed=seed, frame=frame, repeats=repeats)
+    return search_together((search,), problem, settings_source, on_layer)[0]
+
+
+def search_together(
+    searches: Sequence[FrameSearch],
+    problem: FrameLikelihood,
+    settings_source: SettingsSource,
+    on_layer: Callable[[LayerRecord], None] | None = None,
+) -> list[FrameResult]:
+    """Search a frame to its end, a layer of all searches at a time (`step_together`)."""
     settings = None
-    while not search.finished:
+    while not searches[0].finished:
         version, settings = settings_source()
-        record = search.step(problem, version, settings)
-        if on_layer is not None:
-            on_layer(record)
-    return search.result(settings)
+        for record in step_together(searches, problem, version, settings):
+            if on_layer is not None:
+                on_layer(record)
+    return [search.result(settings) for search in searches]
+
+
+def step_together(
+    searches: Sequence[FrameSearch],
+    problem: FrameLikelihood,
+    version: int,
+    settings: Any,  # noqa: ANN401
+) -> list[LayerRecord]:
+    """Do one layer of each of a frame's searches, which have the same tracker and as many layers done: side by side
+    where a card does it, else one after the other. Each has the result that it has alone.
+    """
+    began, at = time.perf_counter(), [search.next_layer(version, settings) for search in searches]
+    records = _step_on_device(searches, problem, at)
+    if records is None:
+        return [search.step_here(problem, one) for search, one in zip(searches, at, strict=True)]
+    return [
+        search.stepped_there(problem, one, record, began, place, len(searches))
+        for place, (search, one, record) in enumerate(zip(searches, at, records, strict=True))
+    ]
+
+
+def _step_on_device(
+    searches: Sequence[FrameSearch], problem: FrameLikelihood, at: Sequence[NextLayer]
+) -> list[LayerRecord] | None:
+    """A layer by a card, on which the particles stay; None where the processor is to do it.
+
+    Raises StudioError where a card that was asked for fails.
+    """
+    there = problem.on_device() if isinstance(problem, WeighedOnDevice) else None
+    fit = all(search.fits_device(one) for search, one in zip(searches, at, strict=True))
+    if there is None or not fit:
+        return None
+    first, layer = searches[0], at[0].layer
+    try:
+        on_device = first.on_device
+        if on_device is None or layer == 0:
+            on_device = _begun_on_device(searches, there, at)
+        records = on_device.step(layer, [one.numbers for one in at], at[0].in_use)
+    except StudioError:
+        raise
+    except Exception as error:
+        assert isinstance(problem, WeighedOnDevice)
+        problem.give_up_device(error)
+        if layer > 0 and any(search.is_only_there for search in searches):
+            raise RunError(
+                f"The card failed in layer {layer + 1} of frame {first.frame}: {error}.",
+                "Track the frame again; the processor searches it.",
+            ) from None
+        return None
+    for search in searches:
+        search.on_device = on_device
+    return records
+
+
+def _begun_on_device(
+    searches: Sequence[FrameSearch], there: "ProblemOnDevice", at: Sequence[NextLayer]
+) -> SearchOnDevice:
+    """Searches on a card, with the sets that a layer weighs."""
+    tracker, settings = searches[0].tracker, at[0].in_use
+    module = importlib.import_module(tracker.device_module)
+    spaces = [search.space for search in searches]
+    on_device: SearchOnDevice = module.DeviceSearch(tracker, there, spaces, settings)
+    if at[0].layer > 0:
+        sets = [search.state.particles for search in searches]
+        on_device.take([one for one in sets if one is not None])
+        return on_device
+    starts = [search.start(one) for search, one in zip(searches, at, strict=True)]
+    if starts[0].particles is None:
+        on_device.take([search.beginning(one) for search, one in zip(searches, at, strict=True)])
+    else:
+        on_device.begin(starts, [one.numbers.beginning for one in at], settings)
+    return on_device
 
 
 def held_over(settings: Any, held: Any) -> Any:  # noqa: ANN401

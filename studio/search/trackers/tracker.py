@@ -7,7 +7,7 @@ are all "layers", counted from 0 in the order they are run (the paper's layer m 
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
@@ -269,26 +269,31 @@ class Variant:
 
 
 class SearchOnDevice(Protocol):
-    """One frame's search on a card, a layer at a time, made of tracker, problem, space and the frame's settings.
-    evaluated : poses that the last layer weighed.
+    """Searches of one frame on a card, one a run, a layer at a time, made of tracker, problem, the runs' spaces and the
+    frame's settings. evaluated : poses of each that the last layer weighed.
     """
 
     evaluated: int
 
-    def begin(self, previous: FilterState, numbers: RandomNumbers, settings: Any) -> None:  # noqa: ANN401
-        """Make the first layer's set from what the last frame left."""
+    def begin(
+        self,
+        previous: Sequence[FilterState],
+        numbers: Sequence[RandomNumbers],
+        settings: Any,  # noqa: ANN401
+    ) -> None:
+        """Make the first layer's sets from what the last frame left."""
         ...
 
-    def take(self, particles: ParticleSet) -> None:
-        """Go on from a set of the host."""
+    def take(self, sets: Sequence[ParticleSet]) -> None:
+        """Go on from sets of the host."""
         ...
 
-    def step(self, layer: int, numbers: RandomNumbers, settings: Any) -> LayerRecord:  # noqa: ANN401
-        """Do a layer and return its record."""
+    def step(self, layer: int, numbers: Sequence[RandomNumbers], settings: Any) -> list[LayerRecord]:  # noqa: ANN401
+        """Do a layer and return its records."""
         ...
 
-    def particles(self) -> ParticleSet:
-        """The set that the next layer weighs, or the last layer's with its weights, on the host."""
+    def particles(self) -> list[ParticleSet]:
+        """The sets that the next layer weighs, or the last layer's with their weights, on the host."""
         ...
 
 

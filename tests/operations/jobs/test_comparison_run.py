@@ -75,3 +75,32 @@ def test_a_trial_that_fails_ends_it_with_the_reason(walk: Session) -> None:
     with pytest.raises(RunError, match=r"annealed, seed 0 could not be tracked.*survivor"):
         run_comparison(kept, walk, lambda *_: None, conclude, processes=1)
     assert not kept.is_running()
+
+
+def test_seeds_that_a_card_searches_side_by_side_have_outcomes_of_their_own(walk: Session) -> None:
+    """Without a card `auto` is the processor, which searches a frame of all seeds at a time: the same comes out."""
+    plan = small(walk, seeds=3)
+    on_card = [
+        replace(one, changes={**one.changes, "device": "auto"}) if one.name == "annealed" else one
+        for one in plan.candidates
+    ]
+    jobs, found = list[str](), []
+    with ThreadPoolExecutor(1) as threads:
+        for candidates in (tuple(on_card), plan.candidates):
+            steps: list[tuple[str, int, int]] = []
+            kept = new_comparison(place_of(walk), replace(plan, candidates=candidates))
+            done = run_comparison(
+                kept,
+                walk,
+                lambda *step, steps=steps: steps.append(step),
+                conclude,
+                processes=1,
+                executor=threads,
+            )
+            jobs.append(" ".join(step[0] for step in steps))
+            found.append([[replace(seed, seconds=0.0) for seed in one.seeds] for one in done.trackers])
+            assert done_before(kept, kept.plan(walk)) == 6
+            assert [step[1] for step in steps] == list(range(7))
+    assert found[0] == found[1]
+    assert jobs[0].startswith(" annealed, seed 0 annealed, seed 1 annealed, seed 2 condensation, seed 0")
+    assert jobs[1].startswith(" annealed, seed 0 condensation, seed 0")

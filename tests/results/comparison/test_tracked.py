@@ -11,8 +11,16 @@ from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.evidence.settings import EvidenceSettings
 from studio.foundations.errors import NotFoundError, SessionError
 from studio.foundations.progress import heard_by
+from studio.results.comparison import tracked
 from studio.results.comparison.footage_cache import FootageCache
-from studio.results.comparison.tracked import Changed, TrackingTrial, track
+from studio.results.comparison.tracked import (
+    Changed,
+    TrackingTrial,
+    measure_seeds,
+    seeds_at_once,
+    track,
+    track_seeds,
+)
 
 SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 SMALL = {"layers": 3, "particles": 20}
@@ -45,6 +53,46 @@ def test_an_attempt_is_measured_and_gives_the_same_again(cache) -> None:
     assert first.worst_mm == max(first.per_frame_mm)
     assert same(first, track(attempt(), cache))
     assert not same(first, track(attempt(seed=4), cache))
+
+
+@pytest.mark.parametrize("changes", [{}, {"refine_frames": True, "occlusion_aware": True}])
+def test_seeds_tracked_side_by_side_are_those_tracked_alone(cache, changes) -> None:
+    trial = attempt(changes={**SMALL, **changes})
+    together = track_seeds(trial, (3, 4, 9), cache)
+    for seed, one in zip((3, 4, 9), together, strict=True):
+        assert same(one, track(attempt(seed=seed, changes={**SMALL, **changes}), cache))
+
+
+def test_seeds_that_fail_together_are_tracked_one_by_one(cache, monkeypatch) -> None:
+    trials = [attempt(seed=seed, last=2) for seed in (3, 4)]
+    expected = [track(trial, cache) for trial in trials]
+    whole, asked = tracked.track_seeds, []
+
+    def too_much(trial, seeds, *given, **words):
+        asked.append(len(seeds))
+        if len(seeds) > 1:
+            raise MemoryError
+        return whole(trial, seeds, *given, **words)
+
+    monkeypatch.setattr(tracked, "track_seeds", too_much)
+    found = measure_seeds({"trials": [trial.plain() for trial in trials]}, cache)["measured"]
+    assert asked == [2, 1, 1]
+    assert [{**one, "seconds": 0} for one in found] == [{**asdict(one), "seconds": 0} for one in expected]
+
+
+@pytest.mark.parametrize(
+    ("changes", "most"),
+    [
+        ({}, 1),
+        ({"device": "gpu"}, 64),
+        ({"device": "auto", "particles": 10_000}, 20),
+        ({"device": "gpu", "particles": 200_000}, 1),
+        ({"device": "gpu", "refine_frames": True}, 7),
+    ],
+)
+def test_a_card_searches_so_many_seeds_as_it_holds(changes, most) -> None:
+    """Those whose frames the processor refines are shared among its processes."""
+    assert seeds_at_once(attempt(changes=changes), 100, 16) == most
 
 
 def test_attempts_and_results_survive_json(cache) -> None:

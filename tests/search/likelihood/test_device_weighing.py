@@ -117,7 +117,7 @@ def signatures():
         "find_correlations": (f4, whole, moments, moments),
         "find_root": (moments,),
         "spread": (f4, moments, moments, f8, u8, f8, whole, f4),
-        "take_rows": (f4, f8, f8, whole, whole, whole, f8, f8),
+        "take_rows": (f4, f8, f8, whole, whole, moments, moments),
     }
     found |= {name: (getattr(searching, name), types) for name, types in of_a_layer.items()}
     for module in (weighing, searching):

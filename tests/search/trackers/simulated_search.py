@@ -1,6 +1,7 @@
 """Run with NUMBA_ENABLE_CUDASIM=1 and NUMBA_DISABLE_JIT=1: searches on a card, in Numba's simulator of one. Writes what
 they give to the file named."""
 
+import dataclasses
 import sys
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from studio.search.likelihood.edge_region_silhouette import (
 )
 from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilter
 from studio.search.trackers.condensation import Condensation
-from studio.search.trackers.frame_loop import FrameSearch, search_frame
+from studio.search.trackers.frame_loop import FrameSearch, search_frame, search_together
 from studio.search.trackers.layer_plan import LayerPlan, Noise
 from studio.search.trackers.settings import AnnealedSettings, CondensationSettings
 from studio.search.trackers.tracker import ParticleSet, start_of
@@ -51,7 +52,7 @@ def layers_of(runs, found, name):
     side_by_side = device_search.DeviceFilter(there.device, space, len(runs))
     moments = [device_search.Moment(SEEDS[run], 7, 2) for run in runs]
     start = side_by_side.take([last_set(poses, run) for run in runs])
-    first = side_by_side.begin(start, moments, COUNT, space.sigma, carry="resampled")
+    first = side_by_side.begin(start, moments, COUNT, np.tile(space.sigma, (len(runs), 1)), carry="resampled")
     begun = np.array(first.poses.copy_to_host())
     weighed, following = side_by_side.step(first, there, moments, [PLAN] * len(runs))
     found |= {
@@ -133,6 +134,37 @@ def searches(found):
     }
 
 
+def together(found):
+    """Two frames of two runs that differ by seed and σ0, side by side and each alone."""
+    problem, space, poses = problem_of("gpu")
+    spaces = space, dataclasses.replace(space, sigma=1.5 * space.sigma)
+    trackers = {
+        "annealed": (AnnealedParticleFilter(), dataclasses.replace(SETTINGS, dynamics="constant_velocity")),
+        "condensation": (Condensation(), CondensationSettings(particles=COUNT, scale_frames=3)),
+    }
+    for name, (tracker, settings) in trackers.items():
+        for runs in ((0, 1), (0,), (1,)):
+            carried = [start_of(tuple(poses[run])) for run in runs]
+            records = []
+            for frame in range(2):
+                searches = [
+                    FrameSearch(tracker, last, spaces[run], seed=SEEDS[run], frame=frame, repeats=2 - frame)
+                    for run, last in zip(runs, carried, strict=True)
+                ]
+                source = lambda settings=settings: (0, settings)  # noqa: E731
+                done = search_together(searches, problem, source, records.append)
+                carried = [result.carried for result in done]
+            for place, run in enumerate(runs):
+                own = records[place :: len(runs)]
+                key = f"{name}.{'both' if len(runs) > 1 else 'one'}.{run}"
+                found |= {
+                    f"{key}.poses": np.stack([record.poses for record in own]),
+                    f"{key}.numbers": np.array([(record.beta, record.best_log_weight) for record in own]),
+                    f"{key}.carried": carried[place].particles.log_weights,
+                    f"{key}.estimate": carried[place].estimate,
+                }
+
+
 if __name__ == "__main__":
     from studio.search.trackers import device_kernels, device_search
 
@@ -144,4 +176,5 @@ if __name__ == "__main__":
     layers_of((0, 1), results, "both")
     layers_of((1,), results, "one")
     searches(results)
+    together(results)
     np.savez(sys.argv[1], **results)

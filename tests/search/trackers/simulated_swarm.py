@@ -23,7 +23,7 @@ from studio.search.likelihood.edge_region_silhouette import (
 from studio.search.trackers import device_kernels, device_runs, device_swarm, device_swarm_kernels
 from studio.search.trackers.device_runs import Moment
 from studio.search.trackers.device_swarm import DeviceSwarm, SwarmStep
-from studio.search.trackers.frame_loop import FrameSearch, SearchState
+from studio.search.trackers.frame_loop import FrameSearch, SearchState, search_together
 from studio.search.trackers.particle_swarm import ParticleSwarm
 from studio.search.trackers.swarm_settings import SwarmSettings
 from studio.search.trackers.tracker import FilterState, LayerRecord, SearchSpace, start_of
@@ -136,7 +136,7 @@ def stepped(scenario: Scenario, runs: tuple[int, ...]) -> list[dict[str, np.ndar
         weighed, now = swarm.step(
             now, problem, moments(layer), steps, constraints=rules, trunk_first=layer < 3, sampled=count
         )
-        records = [swarm.record(weighed, layer, is_last=steps is None, run=run) for run in range(len(runs))]
+        records = swarm.records(weighed, layer, is_last=steps is None)
         found.append(
             contents(now) | {"weights": np.array(weighed.weights.copy_to_host()), "records": records}
         )
@@ -172,6 +172,24 @@ def searched(
             sets.append(state.particles)
     assert search is not None
     return {"records": records, "sets": sets, "result": search.result()}
+
+
+def together(runs: tuple[int, ...]) -> dict[int, list[LayerRecord]]:
+    """Records of a frame of runs side by side, that differ by seed and σ0."""
+    problem, records = ToyProblem(), list[LayerRecord]()
+    searches = [
+        FrameSearch(
+            ParticleSwarm(),
+            start_of(tuple(INSIDE + 0.01 * run)),
+            dataclasses.replace(SPACE, sigma=(1.0 + run) * SPACE.sigma),
+            seed=run,
+            frame=2,
+            repeats=2,
+        )
+        for run in runs
+    ]
+    search_together(searches, problem, lambda: (0, SETTINGS), records.append)
+    return {run: records[place :: len(runs)] for place, run in enumerate(runs)}
 
 
 def weighed_there() -> dict[str, Any]:
@@ -212,6 +230,7 @@ def everything() -> dict[str, Any]:
         "next frame": searched(SETTINGS, start=first["result"].carried),
         "in turns": searched(SETTINGS, (True, False, False, True) * 3 + (False, True), resumed=True),
         "begun by the processor": searched(SETTINGS, space=bounded, start=FilterState(None), resumed=True),
+        "together": (together((0, 1, 2)), together((0,)) | together((1,)) | together((2,))),
         "weighed there": weighed_there(),
     }
 

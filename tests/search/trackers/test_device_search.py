@@ -205,6 +205,16 @@ def test_condensation_is_the_processors_but_for_rounding(simulated, problem):
     )
 
 
+@pytest.mark.parametrize("name", ["annealed", "condensation"])
+def test_frames_of_runs_side_by_side_are_those_of_the_runs_alone(simulated, name):
+    """Bit for bit, all layers of two frames, whose runs differ by seed, σ0 and what they carry."""
+    for run in range(2):
+        for part in ("poses", "numbers", "carried", "estimate"):
+            beside, alone = (simulated[f"{name}.{way}.{run}.{part}"] for way in ("both", "one"))
+            np.testing.assert_array_equal(beside, alone, err_msg=f"{run} {part}")
+    assert not np.array_equal(simulated[f"{name}.both.0.poses"], simulated[f"{name}.both.1.poses"])
+
+
 def test_condensation_keeps_the_scale_that_its_first_frame_chose(simulated):
     first, second = simulated["condensation.betas"]
     assert first == pytest.approx(second)
@@ -225,7 +235,7 @@ class Failing:
     def step(self, layer, *_):
         if layer == self.fails:
             raise RuntimeError("[719] unspecified launch failure")
-        return SimpleNamespace()
+        return [SimpleNamespace()]
 
     def particles(self):
         raise RuntimeError("[719] unspecified launch failure")

@@ -273,6 +273,15 @@ def test_a_frame_is_the_processors_but_for_rounding(simulated: dict[str, Any], n
         np.testing.assert_array_equal(one.log_weights, other.log_weights)
 
 
+def test_frames_of_runs_side_by_side_are_those_of_the_runs_alone(simulated: dict[str, Any]) -> None:
+    beside, alone = simulated["together"]
+    for run in range(3):
+        assert len(beside[run]) == 14
+        for one, other in zip(beside[run], alone[run], strict=True):
+            equal_records(one, other)
+    assert not np.array_equal(beside[0][0].poses, beside[1][0].poses)
+
+
 def test_records_are_those_of_all_stages(simulated: dict[str, Any]) -> None:
     frame, _ = simulated["frame"]
     assert frame["result"].evaluations == 2 * (4 * 3 + 5 * 4)
