@@ -1,13 +1,16 @@
 """The page, its assets, the guide, preferences, and what the scene is told to show."""
 
+import html
 import json
 import re
+from dataclasses import replace
 
 import pytest
 from playwright.sync_api import Browser
 from web_doubles import TOKEN, Studio
 
 from studio.app.scene.model import Selection
+from studio.app.server import guide_routes
 from studio.app.server.guide_routes import COURSE, anchor_of
 from studio.app.server.pages import PLACES
 from studio.evidence.settings import EvidenceSettings
@@ -18,6 +21,7 @@ from studio.results.comparison.findings import VERDICTS
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import RecordingSettings
 from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.paper_presets import PAPERS
 from studio.sessions.stored_run import StoredRun
 
 GUIDE_PAGES = (
@@ -138,6 +142,29 @@ def test_the_guide_carries_what_experiments_found_before_and_after(studio: Studi
         firm = "" if document["firm"] else " (not firm)"
         assert why or name not in before or before[name]["verdict"] == document["verdict"] + firm, name
         assert studio.client.get(f"/assets/guide/reproduction/{name}.json").json()["name"] == name
+
+
+def test_the_guide_says_what_is_printed_what_is_run_and_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row an entry of a preset, with its knobs' own values; the third cell is empty where nothing differs."""
+    tables = guide_routes.printed_and_run().split("<h3 ")[1:]
+    assert len(tables) == len(PAPERS)
+    for preset, table in zip(PAPERS, tables, strict=True):
+        rows = re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td><td>(.*?)</td></tr>", table)
+        assert [(html.unescape(printed), html.unescape(why)) for printed, _, why in rows] == [
+            (entry.printed, entry.why) for entry in (*preset.printed, *preset.learning)
+        ]
+        assert {bool(why) for *_, why in rows} == {True, False}
+        for (_, run, _), entry in zip(rows, (*preset.printed, *preset.learning), strict=True):
+            for value in entry.sets.values():
+                if isinstance(value, float | int) and not isinstance(value, bool):
+                    assert re.search(rf"(?<![\d.]){re.escape(f'{value:g}')}(?![\d.])", run), (entry, run)
+    # Another value is another table.
+    first, *others = PAPERS
+    layers = next(entry for entry in first.printed if "layers" in entry.sets)
+    other = replace(layers, sets={**layers.sets, "layers": 7})
+    printed = tuple(other if entry is layers else entry for entry in first.printed)
+    monkeypatch.setattr(guide_routes, "PAPERS", (replace(first, printed=printed), *others))
+    assert guide_routes.printed_and_run().split("<h3 ")[1] != tables[0]
 
 
 def test_the_guide_has_every_knob_with_its_range(studio: Studio) -> None:

@@ -339,6 +339,9 @@ def test_table_1_judges_ratios_independent_of_the_machine() -> None:
         return concluded("caillette-table-1", lambda trial: table_1(trial.arguments["seed"], **wanted))
 
     assert of().verdict == "reproduced"
+    # Whether 1000 particles keep up with 30 frames a second is the machine's affair.
+    in_time = next(entry for entry in of().numbers if "within a 30th of a second" in entry.name)
+    assert (in_time.paper, in_time.verdict) == (None, "answered")
     assert of(views=1.4).verdict == "not reproduced"
     assert of(particles=4.0).verdict == "not reproduced"
     assert of(particles=1.1).verdict == "not reproduced"

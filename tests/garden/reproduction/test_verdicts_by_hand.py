@@ -82,6 +82,55 @@ def test_what_judges_today_gives_the_kept_verdicts_from_the_kept_numbers() -> No
         assert (found.low, found.high) == pytest.approx((shown["low"], shown["high"]), rel=1e-3)
 
 
+NO_WORSE = {"caillette-fig-12", "caillette-fig-12-second", "caillette-unseen", "fleischmann-partitions"}
+"""Where a paper says that something is maintained, or no significant gain: a smaller error is no refutation."""
+BOUNDS = {"particles saved by 10 layers instead of 5": 2.0, "spells that end with the limb found again": 0.5}
+"""What is claimed to be exceeded, by the beginning of a number's name; else an error's ratio is to be below 1."""
+
+
+def possible(entry: dict) -> set[str]:
+    """The verdicts that a kept number may have: of the 90 % interval only its middle is known, what was measured."""
+    paper, low, high, ours = entry["paper"], entry["low"], entry["high"], entry["ours"]
+    if entry["unit"] == "of 1":
+        held = round(ours * entry["seeds"])
+        as_printed = held if paper == 1.0 else entry["seeds"] - held
+        for side, verdict in (("greater", "reproduced"), ("less", "not reproduced")):
+            if stats.binomtest(as_printed, entry["seeds"], 0.5, alternative=side).pvalue <= 0.05:
+                return {verdict}
+        return {"undecided"}
+    if paper is None:
+        bound = next((value for name, value in BOUNDS.items() if entry["name"].startswith(name)), 1.0)
+        if entry["better"] == "higher":
+            low, high, bound = 1.0 / high, 1.0 / low, 1.0 / bound
+        return {"reproduced" if high < bound else "not reproduced" if low >= bound / 1.1 else "undecided"}
+    if (entry["better"] == "lower" and high < paper) or (entry["better"] == "higher" and low > paper):
+        return {"better"}
+    near = (ours >= paper / 1.1 or entry["better"] == "lower") and (
+        ours <= paper * 1.1 or entry["better"] == "higher"
+    )
+    return {"undecided" if low <= paper <= high else "not reproduced", *(["reproduced"] if near else [])}
+
+
+def test_every_kept_verdict_follows_from_its_numbers() -> None:
+    for path in guide_folder().glob("*.json"):
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if path.name == "before.json":
+            continue
+        claimed = [entry for entry in document["numbers"] if entry["verdict"] != "answered"]
+        verdicts = {entry["verdict"] for entry in claimed} or {"answered"}
+        hardest = ("not reproduced", "undecided", "reproduced", "better", "answered")
+        assert document["verdict"] == next(one for one in hardest if one in verdicts), path.name
+        for entry, line in zip(claimed, document["lines"] if claimed else (), strict=True):
+            assert entry["verdict"] in possible(entry), (path.name, entry)
+            assert line.endswith(f": {entry['verdict']}"), (path.name, line)
+            assert entry["seeds"] >= claims.FEWEST_SEEDS or entry["verdict"] != "reproduced", (
+                path.name,
+                entry,
+            )
+            equality = entry["paper"] == 1.0 and entry["unit"] == "×"
+            assert not (equality and entry["better"]) or document["name"] in NO_WORSE, (path.name, entry)
+
+
 def save_half(document: dict) -> None:
     rows = document["tables"][0]["rows"]
     for row in rows:

@@ -141,6 +141,8 @@ def test_what_is_not_as_printed_says_why() -> None:
         0.0,
         0.0,
     )
+    # What 122 clusters and 948 and 2890 states make of what is not printed.
+    assert (learnt.covariance, learnt.epsilon, learnt.least_probability) == ("diagonal", 2.0, 0.0)
 
 
 def test_a_papers_variant_searches_as_its_preset() -> None:

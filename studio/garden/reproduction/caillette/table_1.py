@@ -200,12 +200,11 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
             (LINEAR[0] < of["particles 1000"] / of["particles 500"])
             & (of["particles 1000"] / of["particles 500"] < LINEAR[1])
         ),
-        "depth 7, five views, a fit and 1000 particles within a 30th of a second": (
-            of["hull 7 5"] + of["fit 7"] + of["particles 1000"] <= FRAME_MS
-        ),
     }
     for name, held in claims.items():
         yield share(name, held)
+    in_time = of["hull 7 5"] + of["fit 7"] + of["particles 1000"] <= FRAME_MS
+    yield share("depth 7, five views, a fit and 1000 particles within a 30th of a second", in_time, None)
     for name, above, below in (
         ("depth 7 over 6, five views", "hull 7 5", "hull 6 5"),
         ("depth 8 over 7, five views", "hull 8 5", "hull 7 5"),
@@ -219,7 +218,8 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield (
         f"On {int(np.mean([run['threads'] for run in runs]))} threads of this machine. Our fit is from one prediction; "
         "a run fits from several. Reading and decoding pictures is not in the times. The claims are what the paper "
-        "says of its table: depth matters, views hardly, particles count in proportion, 30 frames a second."
+        "says of its table: depth matters, views hardly, particles count in proportion. That 1000 particles keep up "
+        "with 30 frames a second is answered, not judged: on a machine of today it could hardly fail."
     )
     yield _table("320 × 240 pictures", runs)
     if large:
