@@ -3,6 +3,7 @@
 What is timed on the card is timed by its own events, the median of some; what includes the host by the host's clock.
 """
 
+import dataclasses
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -20,9 +21,11 @@ from studio.search.likelihood.edge_region_silhouette import (
 )
 from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilter
 from studio.search.trackers.device_search import DeviceFilter, Moment
-from studio.search.trackers.frame_loop import search_frame
+from studio.search.trackers.frame_loop import FrameSearch, search_frame, search_together
+from studio.search.trackers.particle_swarm import ParticleSwarm
 from studio.search.trackers.settings import AnnealedSettings
-from studio.search.trackers.tracker import FilterState, ParticleSet, SearchSpace
+from studio.search.trackers.swarm_settings import SwarmSettings
+from studio.search.trackers.tracker import FilterState, FrameResult, ParticleSet, SearchSpace
 
 LAYERS, SMALL, LAUNCHES = 10, 100, 10
 LOADS, WORDS, ROUNDS = 64, 1 << 20, 256
@@ -166,6 +169,61 @@ def many_runs(
         "times_one": round(runs * alone / together, 2),
         "same_as_alone": bool((means_of_one()[0] == means()[0]).all()),
     }
+
+
+def seeds_together(
+    problem: EdgeRegionSilhouetteFrameLikelihood,
+    space: SearchSpace,
+    pose: Array,
+    settings: AnnealedSettings,
+    seeds: int,
+    repeats: int,
+) -> dict[str, float | bool]:
+    """The same as a comparison has it, with every layer's records on the host: milliseconds of a frame of one seed and
+    of all, and how many times one's frames are done a second.
+    """
+    tracker, last = AnnealedParticleFilter(), FilterState(ParticleSet(pose[None], np.zeros(1)))
+
+    def search(count: int) -> list[FrameResult]:
+        searches = [FrameSearch(tracker, last, space, seed=seed, frame=1) for seed in range(count)]
+        return search_together(searches, problem, lambda: (0, settings))
+
+    alone, together = clocked(lambda: search(1), repeats), clocked(lambda: search(seeds), repeats)
+    first, beside = search(1)[0].estimate.pose, search(seeds)[0].estimate.pose
+    return {
+        "seeds": seeds,
+        "one_ms": round(alone, 3),
+        "all_ms": round(together, 3),
+        "times_one": round(seeds * alone / together, 2),
+        "same_as_alone": bool((first == beside).all()),
+    }
+
+
+def swarm_time(
+    problem: EdgeRegionSilhouetteFrameLikelihood,
+    space: SearchSpace,
+    pose: Array,
+    settings: SwarmSettings,
+    repeats: int,
+) -> dict[str, float | int]:
+    """Milliseconds of a frame of a swarm whose particles stay on the card, records read. evaluations : of the frame."""
+    tracker, start = ParticleSwarm(), FilterState(ParticleSet(pose[None], np.zeros(1)))
+    last = search_frame(
+        tracker, problem, start, space, seed=0, frame=0, settings_source=lambda: (0, settings)
+    ).carried
+
+    def search() -> FrameResult:
+        return search_frame(
+            tracker, problem, last, space, seed=0, frame=1, settings_source=lambda: (0, settings)
+        )
+
+    return {"frame": round(clocked(search, repeats), 3), "evaluations": search().evaluations}
+
+
+def swarm_of(evaluations: int) -> SwarmSettings:
+    """A swarm that a card does, of about so many evaluations a frame."""
+    sizes = ParticleSwarm().evaluation_knobs(evaluations, 0)
+    return dataclasses.replace(SwarmSettings(limbs_apart=False), **sizes)
 
 
 def copy_times(likelihood: EdgeRegionSilhouetteLikelihood, evidence: Any, repeats: int) -> dict[str, float]:  # noqa: ANN401

@@ -2,6 +2,11 @@
 
 import importlib
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import numba
 import numpy as np
@@ -21,6 +26,7 @@ from studio.garden.benchmarks.kernels import (
 from studio.garden.benchmarks.results_table import in_lines, rows_of
 from studio.search.likelihood.edge_region import DEVICE_MODULE, EdgeRegionLikelihood, EdgeRegionSettings
 from studio.search.likelihood.silhouette_areas import FULL, silhouettes_of
+from studio.search.trackers.particle_swarm import ParticleSwarm
 
 
 @pytest.fixture(scope="module")
@@ -125,12 +131,47 @@ def test_without_a_card_the_bench_says_so(monkeypatch):
     assert rows_of({"gpu": found}) == []
 
 
+def test_frames_of_a_simulated_card_are_measured(tmp_path):
+    """A swarm's, and those of seeds side by side, which are the ones alone."""
+    tests = Path(__file__).parents[2]
+    script = Path(__file__).with_name("simulated_card.py")
+    folders = tests / "search" / "trackers", tests / "search" / "likelihood", tests, tests.parent
+    simulator = {
+        "NUMBA_ENABLE_CUDASIM": "1",
+        "NUMBA_DISABLE_JIT": "1",
+        "PYTHONPATH": os.pathsep.join(map(str, folders)),
+    }
+    place = tmp_path / "found.json"
+    wrapping = "ignore:overflow encountered in scalar:RuntimeWarning"
+    command = [sys.executable, "-W", "error", "-W", wrapping, str(script), str(place)]
+    done = subprocess.run(command, env={**os.environ, **simulator}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(place.read_text())
+    assert found["swarm"]["evaluations"] == 12
+    assert found["seeds"]["same_as_alone"]
+    assert min(found["swarm"]["frame"], found["seeds"]["times_one"]) > 0.0
+    measures = importlib.import_module("studio.garden.benchmarks.card_measures")
+    whole = measures.swarm_of(10_000)
+    assert ParticleSwarm().evaluations(whole) == 10_000
+    assert ParticleSwarm().fits_device(0, SimpleNamespace(behaviour=None), whole, {})
+
+
 def test_a_cards_figures_are_rows_beside_their_limits(monkeypatch):
     """The processor in the card's place, and what only a card has left out."""
     measures = importlib.import_module("studio.garden.benchmarks.card_measures")
     limits = {"loads_allow_M_per_s": 60.0, "launches_take_ms": 2.0}
     alone = {"card_limits": limits, "resident_rates": {"three_M_per_s": 41.0}, "frame_time": {"frame": 70.0}}
-    for name in ("card_limits", "resident_rates", "frame_time", "many_runs", "copy_times"):
+    alone["swarm_time"] = {"frame": 30.0}
+    absent = (
+        "card_limits",
+        "resident_rates",
+        "frame_time",
+        "many_runs",
+        "seeds_together",
+        "swarm_time",
+        "copy_times",
+    )
+    for name in absent:
         monkeypatch.setattr(measures, name, lambda *_, name=name: alone.get(name, {}))
     monkeypatch.setattr("studio.garden.benchmarks.devices.GPU", "cpu")
     found = json.loads(json.dumps(run_device_benchmark((16, 100_000), particles=(10_000,), repeats=1)))
@@ -140,5 +181,6 @@ def test_a_cards_figures_are_rows_beside_their_limits(monkeypatch):
     three = rows["card: three terms, 100 000 poses there"]
     assert (three["value"], three["limit"], three["reached"]) == (41.0, 60.0, 1.0)
     assert rows["card: annealed 10 × 10 000, a frame"]["reached"] == pytest.approx(15.0 / 70.0, abs=1e-3)
+    assert rows["card: swarm of 10 000 evaluations, a frame"]["value"] == 30.0
     assert rows["card: largest difference of a log-weight"]["reached"] == 1.0
     assert rows["card: three terms, 100 000 poses here"]["value"] > 0.0
