@@ -4,6 +4,7 @@ import asyncio
 import json
 import math
 import queue
+import re
 import threading
 
 import numpy as np
@@ -14,6 +15,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from studio.app.scene.model import Selection
 from studio.app.server.api_document import api_document
+from studio.app.server.app import JOBS
 from studio.app.server.event_encoding import key_of, message_of
 from studio.app.server.event_stream import LIMIT, EventStream, Watcher, _send_all
 from studio.app.server.subject_routes import SUBJECT
@@ -170,6 +172,15 @@ def test_who_comes_later_is_told_of_jobs_under_way(studio: Studio) -> None:
             pass
     answer = studio.client.get(at).json()
     assert {name: message[name] for name in answer} == answer, "what is heard is what is asked for"
+
+
+def test_every_kind_of_job_is_asked_for_where_it_says() -> None:
+    """By its address a page tells its events from others', so it has to be one, letter by letter."""
+    for kind in JOBS:
+        if kind.at:
+            path = re.sub(r"\{\w+\}", "{}", kind.at)
+            known = [re.sub(r"\{\w+\}", "{}", one) for one in DOCUMENT["paths"]]
+            assert path in known, kind.event
 
 
 def test_changes_of_the_workspace_and_moves_of_the_scene_are_reported(studio: Studio) -> None:
