@@ -1,1 +1,3 @@
-"""What every room stands on: geometry, knobs, registry, errors, progress, files of unknown origin, Numba's options."""
+"""What every room stands on: geometry, knobs, registry, errors, progress, processes, files of unknown origin, Numba's
+options.
+"""

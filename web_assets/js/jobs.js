@@ -22,7 +22,7 @@ export const isGoing = (job) => GOING.includes(job?.state);
  * and throws what went wrong. `report` gets each state on the way; once `gone()` nothing waits any
  * more: resolves with null. How it stands is asked for at first, and where events may have been
  * missed; while the studio does not answer, that is reported.
- * @param {any} path
+ * @param {string} path
  * @returns {Promise<any>}
  */
 export function followJob(path, report = (_job) => {}, gone = () => false) {

@@ -148,16 +148,16 @@ class StudioControl:
             if self._process is None:
                 self._process = OwnedProcess(self.take_event, self.take_silence, self.take_end)
 
-    def restart(self, resume: bool = True) -> None:
+    def restart(self, *, resume: bool = True) -> None:
         """Start the process again and open the run that was open; runs that waited wait again.
 
         resume : track on if it was tracking. The search goes at the pace that it had; settings that were changed and
         not yet in use are in the run's folder. Raises StudioError if the run cannot be opened.
         """
         with self._reviving:
-            self._restart(resume)
+            self._restart(resume=resume)
 
-    def _restart(self, resume: bool) -> None:
+    def _restart(self, *, resume: bool) -> None:
         with self._lock:
             before, old = self._said, self._process
             self._process = None

@@ -152,7 +152,7 @@ class Job:
         self._stop = threading.Event()
         self._left, self._step, self._reported = TimeLeft(), "", 0.0
 
-    def cancel(self, closing: bool = False) -> None:
+    def cancel(self, *, closing: bool = False) -> None:
         """Let it end where it stands."""
         self.closing = closing
         self._stop.set()
