@@ -96,8 +96,8 @@ class Campaign:
     def _tested(self, tests: Sequence[str], seconds: float) -> int | None:
         """The exit status of pytest, stopped at the first failure; None when it took too long."""
         options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--rootdir", f"{self._root}"]
-        # -P: the package comes from the copy, not from the folder that pytest is started in.
-        words = [sys.executable, "-P", "-m", "pytest", *options, "-m", "not slow and not browser", *tests]
+        files = [f"{self._root / test}" for test in tests]
+        words = [sys.executable, "-P", "-m", "pytest", *options, "-m", "not slow and not browser", *files]
         environment = {
             **os.environ,
             "PYTHONPATH": f"{self._copy}",
@@ -106,7 +106,8 @@ class Campaign:
         }
         with subprocess.Popen(
             words,
-            cwd=self._root,
+            # Processes that tests start look for the package there first.
+            cwd=self._copy,
             env=environment,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

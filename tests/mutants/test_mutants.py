@@ -29,12 +29,17 @@ def unseen(value: float) -> float:
         -value,
     )
 '''
-TEST = """from toy.room.one import LIMIT, seen
+TEST = """import subprocess
+import sys
+
+from toy.room.one import LIMIT
 
 
-def test_few_are_seen():
-    assert [seen(value) for value in (2, 3, 4)] == [True, False, False]
-    assert seen.__defaults__ == (1,) and LIMIT == 3
+def test_few_are_seen_by_a_process():
+    line = "from toy.room.one import seen; print([seen(value) for value in (2, 3, 4)], seen.__defaults__)"
+    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
+    assert done.stdout == "[True, False, False] (1,)\\n"
+    assert LIMIT == 3
 """
 
 

@@ -8,8 +8,16 @@ from posed_hulls import empty_hull, hull_of, learn_blobs, limb_colours, near, pl
 
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
-from studio.evidence.volume.blob_acquisition import BINS, SUMS, Profiles, blobs_of, colour_change, parts_of
-from studio.evidence.volume.blob_model import cone_blobs
+from studio.evidence.volume.blob_acquisition import (
+    BINS,
+    SEEN,
+    SUMS,
+    Profiles,
+    blobs_of,
+    colour_change,
+    parts_of,
+)
+from studio.evidence.volume.blob_model import cone_blobs, cone_moments
 
 Array = np.ndarray
 
@@ -141,3 +149,14 @@ def test_nothing_learnt_is_the_cones(body: BodyModel) -> None:
         np.testing.assert_array_equal(getattr(model, name), getattr(cones, name))
     learnt = learn_blobs(body, [empty_hull()], body.neutral[None])
     np.testing.assert_array_equal(learnt.offset, cones.offset)
+
+
+def test_what_is_seen_of_a_limb_has_to_be_a_share_of_it_in_every_frame(body: BodyModel) -> None:
+    shin = limb_number(body, "left shin")
+    enough = SEEN * cone_moments(body).volume[shin]
+    slices = slices_of(stepped(80.0))
+    for share, learnt in ((0.9, False), (1.1, True)):
+        sums = np.zeros((len(body.drawn), BINS, SUMS))
+        sums[shin] = slices * (share * 6.0 * enough / slices[:, 0].sum())
+        model = blobs_of(body, Profiles(sums, 6), 12.0)
+        assert np.isfinite(model.colour[model.limb == shin]).all() == learnt

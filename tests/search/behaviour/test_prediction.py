@@ -10,6 +10,7 @@ from toy_behaviour import FPS, toy_model
 from studio.foundations.errors import BehaviourError
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.behaviour.prediction import propagate, start_states, states_at
+from studio.search.behaviour.prediction_kernels import choose_arcs
 
 MANY = 40_000
 LAMBDA = 0.4
@@ -218,3 +219,14 @@ def test_bad_particles_are_refused(model: BehaviourModel) -> None:
         propagate(rng, model, states, values[:, :3], velocities, 0.1)
     with pytest.raises(BehaviourError, match="'hop'"):
         propagate(rng, model, states, values, velocities, 0.1, "hop")
+
+
+def test_the_choice_is_open_however_unlikely_all_are() -> None:
+    """Weights e⁻²⁰⁰⁰ of two transitions, one three times the other."""
+    luck, none = np.linspace(0.0, 0.99, 100), np.zeros(2)
+    states, free = np.zeros(100, dtype=np.int64), np.ones(100, dtype=bool)
+    arcs = (np.array([0, 2]), np.array([5, 3]), np.array([-2000.0, -2000.0 + np.log(3.0)]))
+    chosen = choose_arcs(
+        np.zeros((100, 1)), states, luck, free, *arcs, none[:, None], none[:, None, None], none
+    )
+    np.testing.assert_array_equal(chosen, np.where(luck < 0.25 - 1e-9, 5, 3))

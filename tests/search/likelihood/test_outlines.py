@@ -197,3 +197,14 @@ def test_poses_that_do_not_fit_are_refused(human, ring):
     poses[2, 7] = np.nan
     with pytest.raises(BodyError, match="Parameter 7 of pose 2 is nan"):
         projector.corners(poses)
+
+
+def test_slopes_are_differences_of_corners_in_each_parameter(ring):
+    body = load_body("human25")
+    projector, pose = OutlineProjector.of_body(body, ring), scattered(body, 1)[0]
+    steps = np.where([entry.kind == "angle" for entry in body.parameters], 1e-2, 2.0)
+    corners, slopes = projector.slopes(pose, steps, 0.5)
+    np.testing.assert_array_equal(corners, projector.corners(pose[None])[0][0])
+    for entry, step in enumerate(np.diag(steps)):
+        (ahead, behind), _ = projector.corners(np.stack([pose + step, pose - step]))
+        np.testing.assert_allclose(slopes[..., entry], ahead - behind, atol=1e-3)

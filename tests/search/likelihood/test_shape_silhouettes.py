@@ -1,11 +1,13 @@
 """Bodies of many sizes weighed at once, against bodies built and weighed one by one."""
 
 import numpy as np
+import pytest
 
 from studio.body.catalogue import load_body
 from studio.body.model import kinematic_tables
 from studio.body.shape_space import shape_space
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.foundations.errors import FootageError
 from studio.results.drawing_footage.cameras import placed_camera
 from studio.search.likelihood.kinematic_program import compile_program
 from studio.search.likelihood.outlines import OutlineProjector
@@ -68,3 +70,9 @@ def test_fitness_is_that_of_rounded_bodies_one_by_one() -> None:
             areas = Silhouettes(evidence, HALF).areas(outlines, POSES).fitness()
             expected = areas[:, :2].mean(axis=1) if k == 0 else areas.mean(axis=1)
             np.testing.assert_allclose(found[m, k], expected, atol=3e-3)
+
+
+def test_masks_of_other_cameras_are_refused() -> None:
+    space = shape_space(load_body("human31"))
+    with pytest.raises(FootageError):
+        ShapeSilhouettes(space, CAMERAS[:2], frames(np.random.default_rng(0), 1))

@@ -126,6 +126,10 @@ def test_the_gradient_is_that_of_the_acceleration(body: BodyModel, movement: Arr
         step = 1e-4 * way * refiner.unit
         ahead, back = (mover.equations(poses + sign * step, window, 2.0).loss for sign in (1.0, -1.0))
         assert np.sum(equations.gradient * way) == pytest.approx((ahead - back) / 4e-4, rel=1e-3)
+    # Every three frames in a row count, those before the window too.
+    bends = np.diff(body_points(body, np.concatenate([movement[:2], poses])), 2, axis=0)
+    more = equations.loss - mover.equations(poses, window, 1.0).loss
+    assert more == pytest.approx(np.sum(bends**2), rel=1e-9)
 
 
 def test_blocks_lie_where_the_solver_expects_them() -> None:

@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from drawn_people import drawn_evidence, ring_of_cameras
 from numpy.typing import NDArray
 from sized_people import MEASURED, DrawnPerson, drawn_person
 
 from studio.body.forward_kinematics import limb_ends, marker_points
+from studio.body.model import BodyModel
 from studio.body.shape_space import shape_space
 from studio.evidence.distance_maps import silhouette_distances
+from studio.results.drawing_footage.person import skeleton_of_height
 from studio.search.likelihood.shape_silhouettes import ShapePrograms, ShapeSilhouettes
 from studio.search.trackers.shape_prior import ShapePrior, ShapeSpreads
 from studio.search.trackers.shape_refinement import RefinedShape, ShapeRefiner
@@ -139,3 +142,16 @@ def test_hands_show_where_forearms_end(person: DrawnPerson) -> None:
     print(upper_arms)
     assert upper_arms[0] > upper_arms[1] + 10.0
     assert abs(upper_arms[0]) < 20.0
+
+
+def test_no_more_is_searched_than_the_settings_say(body: BodyModel) -> None:
+    pose, cameras = body.neutral, ring_of_cameras(2, 160, 120)
+    frames = (drawn_evidence(body, pose, cameras),)
+    skeleton = skeleton_of_height(1750.0, np.random.default_rng(0))
+    person = DrawnPerson(skeleton, 1750.0, body, cameras, frames, {}, pose[None])
+
+    def counted(particles: int) -> int:
+        settings = ShapeSearchSettings(particles=particles, layers=4, pose_steps=1, sought=0)
+        return search_of(person, settings).run(person.poses).evaluations
+
+    assert 0 < counted(2) < counted(4)
