@@ -16,6 +16,7 @@ from pathlib import Path
 
 import httpx
 import psutil
+from api_driver import ApiDriver
 
 PATIENCE = 90.0
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,7 +40,7 @@ def _run(command: str, environment: Mapping[str, str], output: Path) -> None:
     main([command, "--port", "0"])
 
 
-class StudioServer:
+class StudioServer(ApiDriver):
     """`studio demo` or `studio serve` on a workspace; stopped with SIGINT as a person would.
 
     footage : the folder that it may read. beside : a folder of packages beside it, which only a new process can find.
@@ -62,11 +63,13 @@ class StudioServer:
         found = self._printed()
         self.address, self.origin, self.token = found[0].removeprefix("Open "), found[1], found[2]
         # A connection each: one that is kept may be closed by the server just when it is used again.
-        self._client = httpx.Client(
-            base_url=self.origin,
-            headers={"authorization": f"Bearer {self.token}"},
-            timeout=PATIENCE,
-            limits=httpx.Limits(max_keepalive_connections=0),
+        super().__init__(
+            httpx.Client(
+                base_url=self.origin,
+                headers={"authorization": f"Bearer {self.token}"},
+                timeout=PATIENCE,
+                limits=httpx.Limits(max_keepalive_connections=0),
+            )
         )
 
     def __enter__(self) -> "StudioServer":
@@ -86,24 +89,6 @@ class StudioServer:
                 self.process.join()
                 raise AssertionError(f"no address was printed: {text}")
             time.sleep(0.1)
-
-    def get(self, path: str, window: str = "") -> dict:
-        """A JSON answer of the API. window : that asks, by its name."""
-        answer = self._client.get(path, headers={"x-studio-window": window})
-        assert answer.is_success, answer.text
-        return answer.json()
-
-    def text(self, path: str) -> str:
-        """An answer that is no JSON."""
-        answer = self._client.get(path)
-        assert answer.is_success, answer.text
-        return answer.text
-
-    def post(self, path: str, body: object = None, method: str = "POST", window: str = "") -> dict:
-        """Ask for something. window : that asks, by its name."""
-        answer = self._client.request(method, path, json=body, headers={"x-studio-window": window})
-        assert answer.is_success, answer.text
-        return answer.json() if answer.content else {}
 
     def until(self, wanted: Callable[[dict], bool]) -> dict:
         """The worker's state once it is as wanted."""
@@ -142,7 +127,7 @@ class StudioServer:
 
     def stop(self) -> None:
         """Ctrl-C, and wait until all is closed; it must not have ended before by itself."""
-        self._client.close()
+        self.client.close()
         log = self.workspace / ".studio" / "server.log"
         if log.exists() and "Traceback" in (text := log.read_text()):
             print(text[text.rindex("Traceback") :])  # for the report of a test that failed

@@ -202,7 +202,7 @@ def test_every_panel_and_dialog_of_the_studio(window: StudioPage, studio: Studio
     page.locator("#panel-views table").first.wait_for()
     check(window, "a view as a table")
     window.key("t")
-    studio.post(f"{RUN}/settings?frame=2", {"survival": 0.55}, method="PATCH")
+    studio.patch(f"{RUN}/settings?frame=2", {"survival": 0.55})
     page.locator("#trial .outcome").wait_for()
     check(window, "a frame annealed again")
     page.get_by_role("button", name="Put back", exact=True).click()

@@ -54,7 +54,7 @@ def test_masks_follow_a_slider_and_are_kept(page: Page, studio: StudioServer, ar
     page.get_by_role("button", name="Keep", exact=True).click()
     expect(page.locator(".knob.changed")).to_have_count(0)
     assert studio.get("/api/sessions/person/evidence")["knobs"] == {"mask_threshold": 12}
-    studio.post("/api/sessions/person/evidence", {}, method="PUT")
+    studio.put("/api/sessions/person/evidence", {})
 
 
 def test_the_background_is_set_up_and_the_views_agree(

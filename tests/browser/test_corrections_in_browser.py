@@ -34,7 +34,7 @@ def opened(browser: Browser, studio: StudioServer) -> StudioPage:
 def edited(window: StudioPage, wanted: Callable[[dict], bool]) -> None:
     """Wait until the editor of the window's scene is as wanted."""
     deadline = time.monotonic() + 30.0
-    while not wanted(response := window.studio.get("/api/scene/edit", window.name)):
+    while not wanted(response := window.studio.get("/api/scene/edit", window=window.name)):
         assert time.monotonic() < deadline, response
         time.sleep(0.02)
 

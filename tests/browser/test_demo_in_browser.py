@@ -44,7 +44,7 @@ def window(browser: Browser, demo: StudioServer) -> Iterator[StudioPage]:
     and tracked on in the window.
     """
     # The steps stay beside any run of this session; without them the scene has room for its knobs.
-    demo.post("/api/preferences", {"first-steps": "closed"}, method="PATCH")
+    demo.patch("/api/preferences", {"first-steps": "closed"})
     demo.post("/api/sessions/walk/runs", {"name": "run-1"})
     demo.post(f"{RUN}/start")
     demo.pace(PACE)
@@ -67,7 +67,7 @@ def test_the_first_two_minutes(
     """From the printed address without a click: layers play; then step by step, until the steps are closed for good.
     With the scene drawn in software it takes minutes, and pictures of all of it are kept.
     """
-    demo.post("/api/preferences", {"first-steps": None}, method="PATCH")
+    demo.patch("/api/preferences", {"first-steps": None})
     window = StudioPage(browser, demo, with_scene=with_scene)
     page = window.page
 
@@ -75,7 +75,7 @@ def test_the_first_two_minutes(
         if with_scene:
             window.shoot(artefacts / f"first-steps-{name}.png")
 
-    until(page, lambda: demo.get("/api/scene/play-layers", window.name)["playing"])
+    until(page, lambda: demo.get("/api/scene/play-layers", window=window.name)["playing"])
     seen: set[object] = set()
     until(page, lambda: seen.add(window.get("layer")) or {0, 4, 9} <= seen)
     assert (window.get("run"), window.get("frame"), window.get("view")) == ("ten-layers", 10, "variance")
@@ -137,7 +137,7 @@ def test_the_first_two_minutes(
 @pytest.mark.slow
 def test_a_step_stays_and_says_which_run_it_is_about(browser: Browser, demo: StudioServer) -> None:
     """Also after a reload and while another run is looked at; a comparison goes on with the run that is chosen."""
-    demo.post("/api/preferences", {"first-steps": None}, method="PATCH")
+    demo.patch("/api/preferences", {"first-steps": None})
     window = StudioPage(browser, demo, with_scene=False)
     page = window.page
     strip = page.locator(".first-steps")
@@ -180,10 +180,10 @@ def test_annealing_is_seen_on_the_first_screen(browser: Browser, demo: StudioSer
     """From the printed address, at 1280 × 800, also in a later window: the body is large and of glass, the first clouds
     at hands and feet are wide, the last one's still are clouds, and nothing covers any of it.
     """
-    demo.post("/api/preferences", {"first-steps": None}, method="PATCH")
+    demo.patch("/api/preferences", {"first-steps": None})
     window = StudioPage(browser, demo)
     page = window.page
-    until(page, lambda: demo.get("/api/scene/play-layers", window.name)["playing"])
+    until(page, lambda: demo.get("/api/scene/play-layers", window=window.name)["playing"])
     page.get_by_role("region", name="The first two minutes").wait_for()
     run = Workspace(demo.workspace).session("walk").run("ten-layers")
     frame, body = window.get("frame"), run.body()
@@ -207,7 +207,7 @@ def test_annealing_is_seen_on_the_first_screen(browser: Browser, demo: StudioSer
     # Stand still, at the first layer.
     page.evaluate("async () => (await import('/assets/js/studio/layer_playback.js')).scrubTo(0)")
     until(page, lambda: window.wire.layers().keys() == {0})
-    until(page, lambda: not demo.get("/api/scene/play-layers", window.name)["playing"])
+    until(page, lambda: not demo.get("/api/scene/play-layers", window=window.name)["playing"])
     scene = page.frame_locator("#scene")
     scene.locator("#webgl-software-rendering button").dispatch_event("click")
     # This browser has no graphics card: its pictures are not smoothed, which would take it twice as long.

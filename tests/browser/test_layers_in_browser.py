@@ -123,7 +123,7 @@ def test_layers_are_played_stepped_and_left(
 
 def test_a_what_if_is_kept_as_a_run_of_its_own(window: StudioPage, studio: StudioServer, page: Page) -> None:
     before = studio.text(f"{RUNS}/one/poses.csv")
-    studio.post(f"{RUNS}/one/settings?frame=5", {"survival": 0.8}, method="PATCH")
+    studio.patch(f"{RUNS}/one/settings?frame=5", {"survival": 0.8})
     window.key("End")
     window.page.evaluate("async () => (await import('/assets/js/selection.js')).select({ frame: 5 })")
     window.until("get('frame') === 5 && get('work').state === 'finished'")

@@ -37,7 +37,7 @@ def test_a_start_pose_is_made_better_and_edited(browser: Browser, studio: Studio
     wanted = true_poses()[0].tolist()
     studio.post("/api/scene/edit", {"session": "toy", "frame": 0, "pose": wanted}, window=window.name)
     for _ in range(500):
-        response = studio.get("/api/scene/edit", window.name)
+        response = studio.get("/api/scene/edit", window=window.name)
         if response["editing"] and response["pose"] == wanted:
             break
         page.wait_for_timeout(20)

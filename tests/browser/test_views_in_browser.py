@@ -422,7 +422,7 @@ def test_a_what_if_says_what_it_changes_and_is_discarded(window: StudioPage, stu
     page = window.page
     page.bring_to_front()
     show(window, "schedule")
-    studio.post(f"{RUN}/settings?frame={FRAME}", {"survival": 0.55}, method="PATCH")
+    studio.patch(f"{RUN}/settings?frame={FRAME}", {"survival": 0.55})
     bar = page.locator("#trial .outcome")
     bar.wait_for()
     trials = window.get("trials")
@@ -470,7 +470,7 @@ def test_a_trial_is_drawn_beside_the_stored_discarded_and_taken_back(
     show(window, "schedule")
     more = LAYERS + 3
     changes = {"survival": 0.7, "layers": more, "particles": 40}
-    studio.post(f"{RUN}/settings?frame={FRAME}", changes, method="PATCH")
+    studio.patch(f"{RUN}/settings?frame={FRAME}", changes)
     window.until(f"get('trial') && get('whatIf')?.length === {more} && get('trials')")
     trial = f"?trial={window.get('trial')}"
     names = list(Workspace(studio.workspace).session("walk").run("seen").record.parameters)
@@ -552,7 +552,7 @@ def test_moved_knobs_are_kept_per_run_until_they_are_put_back(
     )
     show(window, "schedule")
     stored = studio.get(f"{RUN}/settings")["values"]
-    studio.post(f"{RUN}/settings?frame={FRAME}", {"survival": 0.5, "particles": 70}, method="PATCH")
+    studio.patch(f"{RUN}/settings?frame={FRAME}", {"survival": 0.5, "particles": 70})
     studio.until(lambda state: state["state"] != "reannealing")
     wanted = {"survival rate": (SETTINGS["survival"], 0.5), "particles": (PARTICLES, 70)}
     window.until("get('moved')?.length === 2 && get('whatIf')")

@@ -151,7 +151,7 @@ def test_what_the_scene_said_before_it_knew_of_a_move_changes_nothing(
     until(window.page, lambda: wishes and wishes[-1]["frame"] == 0)
     number = int(str(wishes[-1]["request_number"]))
     said = {"type": "scene", "session": "left", "run": "of-left", "frame": FRAMES - 1, "follow": True}
-    said["layers"] = studio.get("/api/scene/play-layers", window.name)
+    said["layers"] = studio.get("/api/scene/play-layers", window=window.name)
     for known, frame in ((number - 1, 0), (number, FRAMES - 1)):
         event = json.dumps(said | {"request_number": known})
         window.page.evaluate("event => window.events.onmessage({ data: event })", event)

@@ -157,4 +157,4 @@ def studio(
         log_path=log_path,
     )
     with serving(app) as base, let_in(base, TOKEN) as client:
-        yield Studio(base, client, control, scenes, workspace, app, log_path)
+        yield Studio(client, base, control, scenes, workspace, app, log_path)

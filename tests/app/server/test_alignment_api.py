@@ -30,7 +30,7 @@ def session(made: Path, studio: Studio) -> Session:
 
 def calibration_why(studio: Studio) -> str:
     """What the guided set-up says of the calibration."""
-    steps = studio.client.get("/api/sessions/nudged/way").json()["steps"]
+    steps = studio.get("/api/sessions/nudged/way")["steps"]
     return next(step["why"] for step in steps if step["step"] == "calibration")
 
 
@@ -38,9 +38,9 @@ def calibration_why(studio: Studio) -> str:
 def test_cameras_are_measured_turned_and_turned_back(studio: Studio, session: Session) -> None:
     before = (session.path / CAMERAS_PATH).read_bytes()
     run = prepare_run(session, start_pose=session.body().neutral, last=2, name="old")
-    response = studio.client.get(PLACE).json()
+    response = studio.get(PLACE)
     assert (response["possible"], response["job"], response["turned"]) == (True, None, False)
-    assert studio.client.post(PLACE, json={}).status_code == 202
+    studio.post(PLACE, {}, code=202)
     job = studio.ended(PLACE, "job")
     assert job["state"] == "done", job
     lines = {line["camera"]: line for line in job["cameras"]}
@@ -48,26 +48,25 @@ def test_cameras_are_measured_turned_and_turned_back(studio: Studio, session: Se
     assert (job["needed"], job["better"], len(job["frames"])) == (True, True, 8)
     assert "they would miss by" in job["words"]
     assert f"({NUDGED})" in calibration_why(studio)
-    kept = studio.client.post(f"{PLACE}/keep").json()
+    kept = studio.post(f"{PLACE}/keep")
     assert (kept["turned"], kept["job"]["kept"]) == (True, True)
     assert any(run.name in note for note in kept["notes"])
     assert calibration_why(studio) == ""
-    undone = studio.client.post(f"{PLACE}/undo").json()
+    undone = studio.post(f"{PLACE}/undo")
     assert (session.path / CAMERAS_PATH).read_bytes() == before
     assert (undone["turned"], undone["job"]["kept"]) == (False, False)
-    assert studio.client.post(f"{PLACE}/undo").json()["code"] == "not-found"
+    assert studio.post(f"{PLACE}/undo", code=404)["code"] == "not-found"
 
 
 def test_what_was_measured_of_another_calibration_is_not_used(studio: Studio, session: Session) -> None:
-    assert studio.client.post(f"{PLACE}/keep").status_code == 404
-    studio.client.post(PLACE, json={"frames": [0, 1, 2, 3, 4, 5]})
+    studio.post(f"{PLACE}/keep", code=404)
+    studio.post(PLACE, {"frames": [0, 1, 2, 3, 4, 5]})
     assert studio.ended(PLACE, "job")["state"] == "done"
     other = make_nudged_session(studio.workspace.root / "other", degrees=3.0)
     shutil.copyfile(other.path / CAMERAS_PATH, session.path / CAMERAS_PATH)
-    assert studio.client.get(PLACE).json()["job"] is None
-    refused = studio.client.post(f"{PLACE}/keep")
-    assert refused.status_code == 422
-    assert "has changed" in refused.json()["message"]
+    assert studio.get(PLACE)["job"] is None
+    refused = studio.post(f"{PLACE}/keep", code=422)
+    assert "has changed" in refused["message"]
 
 
 def test_measuring_is_cancelled_and_fails_in_words(
@@ -79,13 +78,13 @@ def test_measuring_is_cancelled_and_fails_in_words(
             time.sleep(0.01)
 
     monkeypatch.setattr(cameras, "align_cameras", waits)
-    assert studio.client.post(PLACE, json={}).status_code == 202
-    assert studio.client.post(PLACE, json={}).json()["code"] == "run"
-    studio.client.delete(PLACE)
+    studio.post(PLACE, {}, code=202)
+    assert studio.post(PLACE, {}, code=409)["code"] == "run"
+    studio.delete(PLACE)
     assert studio.ended(PLACE, "job")["state"] == "cancelled"
     monkeypatch.undo()
-    studio.client.post(PLACE, json={"frames": [0]})
+    studio.post(PLACE, {"frames": [0]})
     failed = studio.ended(PLACE, "job")
     assert failed["state"] == "failed"
     assert "Too few silhouettes" in failed["message"]
-    assert studio.client.get("/api/sessions/take1/alignment").json()["possible"]
+    assert studio.get("/api/sessions/take1/alignment")["possible"]

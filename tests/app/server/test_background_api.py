@@ -27,38 +27,33 @@ PLACE = "/api/sessions/take1"
 
 def plate_upload(studio: Studio, name: str, picture: np.ndarray) -> str:
     """An upload of one picture."""
-    identifier = studio.client.post("/api/uploads").json()["identifier"]
-    content = cv2.imencode(".png", picture)[1].tobytes()
-    place = f"/api/uploads/{identifier}/files?path={name}"
-    assert studio.client.put(place, content=content).status_code == 200
-    return identifier
+    return studio.upload({name: cv2.imencode(".png", picture)[1].tobytes()})
 
 
 def test_the_median_is_set_up_and_said(studio: Studio) -> None:
-    before = studio.client.get(f"{PLACE}/background").json()
+    before = studio.get(f"{PLACE}/background")
     assert "median" in before["possible"]
     assert "plate" not in before["possible"]
     offered = {one["name"]: one for one in before["sources"]}
     assert {name for name, one in offered.items() if not one["lacking"]} == set(before["possible"])
     assert offered["plate"]["lacking"] == "Give a picture for every camera below."
     assert {"mask_threshold", "background_model"} <= set(before["settings"])
-    begun = studio.client.post(f"{PLACE}/background", json={"source": "median", "tune": False})
-    assert begun.status_code == 202
+    studio.post(f"{PLACE}/background", {"source": "median", "tune": False}, code=202)
     assert studio.ended(f"{PLACE}/background", "job")["state"] == "done"
-    after = studio.client.get(f"{PLACE}/background").json()
+    after = studio.get(f"{PLACE}/background")
     assert after["source"] == "median"
     assert after["own"] == {"background_model": "median"}
 
 
 def test_a_person_is_looked_for_and_nobody_found(studio: Studio) -> None:
-    before = studio.client.get(f"{PLACE}/background").json()
+    before = studio.get(f"{PLACE}/background")
     assert "person" in before["possible"]
     assert "masks" not in before["possible"]
-    assert studio.client.post(f"{PLACE}/background", json={"source": "person"}).status_code == 202
+    studio.post(f"{PLACE}/background", {"source": "person"}, code=202)
     job = studio.ended(f"{PLACE}/background", "job")
     assert job["state"] == "failed"
     assert "No camera sees a person" in job["message"]
-    after = studio.client.get(f"{PLACE}/background").json()
+    after = studio.get(f"{PLACE}/background")
     assert (after["source"], after["own"]) == (before["source"], before["own"])
 
 
@@ -66,7 +61,7 @@ def test_given_masks_stay_remembered_when_knobs_are_kept(studio: Studio) -> None
     session = studio.workspace.session("take1")
     given = {source.name: "masks/x" for source in session.manifest.footage.cameras}
     write_evidence(session, SessionEvidence(given_masks=given))
-    assert studio.client.put(f"{PLACE}/evidence", json={"mask_threshold": 5}).status_code == 200
+    studio.put(f"{PLACE}/evidence", {"mask_threshold": 5})
     assert read_evidence(session) == SessionEvidence(knobs={"mask_threshold": 5}, given_masks=given)
 
 
@@ -83,21 +78,19 @@ def test_progress_cancel_and_a_second_one_at_once(studio: Studio, monkeypatch: p
             time.sleep(0.01)
 
     monkeypatch.setattr(masks, "set_up_background", waits)
-    assert studio.client.post(f"{PLACE}/background", json={"source": "median"}).status_code == 202
+    studio.post(f"{PLACE}/background", {"source": "median"}, code=202)
     assert at_work.wait(PATIENCE)
-    job = studio.client.get(f"{PLACE}/background").json()["job"]
+    job = studio.get(f"{PLACE}/background")["job"]
     assert (job["step"], job["total"]) == ("finding empty regions", 4)
-    again = studio.client.post(f"{PLACE}/background", json={"source": "median"})
-    assert again.status_code == 409
-    assert studio.client.delete(f"{PLACE}/background").status_code == 202
+    studio.post(f"{PLACE}/background", {"source": "median"}, code=409)
+    studio.delete(f"{PLACE}/background", code=202)
     assert studio.ended(f"{PLACE}/background", "job")["state"] == "cancelled"
 
 
 def test_what_cannot_be_is_refused_in_words(studio: Studio) -> None:
-    assert studio.client.post(f"{PLACE}/background", json={"source": "magic"}).status_code == 422
-    wrong = studio.client.post(f"{PLACE}/background", json={"source": "median", "knobs": {"mask_x": 1}})
-    assert wrong.status_code == 422
-    studio.client.post(f"{PLACE}/background", json={"source": "plate"})
+    studio.post(f"{PLACE}/background", {"source": "magic"}, code=422)
+    studio.post(f"{PLACE}/background", {"source": "median", "knobs": {"mask_x": 1}}, code=422)
+    studio.post(f"{PLACE}/background", {"source": "plate"})
     job = studio.ended(f"{PLACE}/background", "job")
     assert job["state"] == "failed"
     assert "has no plate" in job["message"]
@@ -108,7 +101,7 @@ def test_a_failure_leaves_backgrounds_as_they_were(studio: Studio, monkeypatch: 
         raise FootageError("The clip ends.", "Give another.")
 
     monkeypatch.setattr("studio.runs.setup.background_setup.use_given_backgrounds", fails)
-    studio.client.post(f"{PLACE}/background", json={"source": "median"})
+    studio.post(f"{PLACE}/background", {"source": "median"})
     assert studio.ended(f"{PLACE}/background", "job")["message"] == "The clip ends."
     assert not (studio.workspace.session("take1").path / "evidence.json").exists()
 
@@ -119,16 +112,15 @@ def test_uploaded_plates_are_matched_by_name_or_as_said(studio: Studio) -> None:
     picture = np.full((source.height, source.width, 3), 90, np.uint8)
     for camera in sources:
         upload = plate_upload(studio, f"empty_{camera.name}.png", picture)
-        response = studio.client.post(f"{PLACE}/backgrounds", json={"upload": upload})
-        assert response.status_code == 200, response.text
-        assert studio.client.get(f"/api/uploads/{upload}").status_code == 404
-    assert [camera["given"] for camera in response.json()["cameras"]] == ["plate"] * len(sources)
-    assert "plate" in response.json()["possible"]
+        response = studio.post(f"{PLACE}/backgrounds", {"upload": upload})
+        studio.get(f"/api/uploads/{upload}", code=404)
+    assert [camera["given"] for camera in response["cameras"]] == ["plate"] * len(sources)
+    assert "plate" in response["possible"]
     named = plate_upload(studio, "whatever.png", picture)
     request = {"upload": named, "files": {source.name: "whatever.png"}}
-    assert studio.client.post(f"{PLACE}/backgrounds", json=request).status_code == 200
+    studio.post(f"{PLACE}/backgrounds", request)
     small = plate_upload(studio, f"{source.name}.png", picture[:10, :10])
-    assert studio.client.post(f"{PLACE}/backgrounds", json={"upload": small}).status_code == 422
+    studio.post(f"{PLACE}/backgrounds", {"upload": small}, code=422)
     outside = {"upload": plate_upload(studio, "a.png", picture), "files": {source.name: "../../a.png"}}
     assert studio.client.post(f"{PLACE}/backgrounds", json=outside).status_code in (403, 422)
 
@@ -137,11 +129,11 @@ def test_strokes_are_painted_tried_kept_and_carried(studio: Studio) -> None:
     ball = patched_ball(studio.workspace.root / "ball")
     here = "/api/sessions/ball"
     place = f"{here}/strokes"
-    before = studio.client.get(place).json()["cameras"]
+    before = studio.get(place)["cameras"]
     assert [(one["camera"], one["strokes"], one["ready"]) for one in before] == [
         (f"cam{n}", [], False) for n in range(3)
     ]
-    assert "strokes" not in studio.client.get(f"{here}/background").json()["possible"]
+    assert "strokes" not in studio.get(f"{here}/background")["possible"]
     painted = {
         name: [
             {
@@ -155,10 +147,8 @@ def test_strokes_are_painted_tried_kept_and_carried(studio: Studio) -> None:
         for name in ("cam0", "cam1", "cam2")
     }
     strokes, true = painted["cam1"], ball.masks["cam1", 2]
-    assert (
-        studio.client.post(f"{place}/cam1/preview", json={"frame": 0, "strokes": strokes}).status_code == 204
-    )
-    paths = studio.client.get("/api/openapi.json").json()["paths"]
+    studio.post(f"{place}/cam1/preview", {"frame": 0, "strokes": strokes}, code=204)
+    paths = studio.get("/api/openapi.json")["paths"]
     assert "204" in paths["/api/sessions/{session}/strokes/{camera}/preview"]["post"]["responses"]
     shown = studio.client.post(f"{place}/cam1/preview", json={"frame": 2, "strokes": strokes})
     assert shown.headers["content-type"] == "image/png"
@@ -170,19 +160,17 @@ def test_strokes_are_painted_tried_kept_and_carried(studio: Studio) -> None:
     refused = studio.client.put(f"{place}/cam1", json={"strokes": wrong})
     assert refused.status_code >= 400
     assert "no frame 99" in refused.json()["message"]
-    assert studio.client.put(f"{place}/side", json={"strokes": strokes}).status_code == 404
+    studio.put(f"{place}/side", {"strokes": strokes}, code=404)
     for name, those in painted.items():
-        assert studio.client.put(f"{place}/{name}", json={"strokes": those}).status_code == 200
-    kept = studio.client.get(place).json()["cameras"][1]
+        studio.put(f"{place}/{name}", {"strokes": those})
+    kept = studio.get(place)["cameras"][1]
     assert (kept["strokes"], kept["ready"], kept["made"]) == (strokes, True, False)
-    assert (
-        studio.client.post(f"{here}/background", json={"source": "strokes", "tune": False}).status_code == 202
-    )
+    studio.post(f"{here}/background", {"source": "strokes", "tune": False}, code=202)
     assert studio.ended(f"{here}/background", "job")["state"] == "done"
-    after = studio.client.get(f"{here}/background").json()
+    after = studio.get(f"{here}/background")
     assert after["source"] == "strokes"
     assert "best" in after["possible"]
-    assert studio.client.get(place).json()["cameras"][1]["made"]
+    assert studio.get(place)["cameras"][1]["made"]
 
 
 def test_strokes_can_be_painted_again_after_the_footage_has_become_shorter(studio: Studio) -> None:
@@ -194,32 +182,30 @@ def test_strokes_can_be_painted_again_after_the_footage_has_become_shorter(studi
     write_strokes(ball.session, late)
     change_footage(ball.session, offsets={"cam0": 1})
     place = "/api/sessions/ball/strokes"
-    assert [one["strokes"] for one in studio.client.get(place).json()["cameras"]] == [[], [], []]
+    assert [one["strokes"] for one in studio.get(place)["cameras"]] == [[], [], []]
     again = {"frame": 0, "kind": "inside", "width": 4, "points": [[5, 5]]}
     for name in ("cam0", "cam1", "cam2"):
-        kept = studio.client.put(f"{place}/{name}", json={"strokes": [again]})
-        assert kept.status_code == 200, kept.text
-    assert "strokes" in studio.client.get("/api/sessions/ball/background").json()["possible"]
+        studio.put(f"{place}/{name}", {"strokes": [again]})
+    assert "strokes" in studio.get("/api/sessions/ball/background")["possible"]
 
 
 def test_one_of_several_is_chosen_by_where_he_stands(studio: Studio) -> None:
     made = two_people(studio.workspace.root / "two", 2)
     place = "/api/sessions/two"
-    seen = studio.client.get(f"{place}/subjects").json()["subjects"]
+    seen = studio.get(f"{place}/subjects")["subjects"]
     assert len(seen) == 2
     assert all(0.0 <= share < 1.0 for one in seen for point in one["points"].values() for share in point)
-    before = studio.client.get(f"{place}/background").json()
+    before = studio.get(f"{place}/background")
     assert "subject" in before["possible"]
-    nobody = studio.client.post(f"{place}/background", json={"source": "subject"})
-    assert nobody.status_code == 202
+    studio.post(f"{place}/background", {"source": "subject"}, code=202)
     assert "Nobody was chosen" in studio.ended(f"{place}/background", "job")["message"]
     chosen = min(seen, key=lambda one: abs(one["at"][0] - made.places()[1][0]))
     request = {"source": "subject", "subject_at": chosen["at"]}
-    assert studio.client.post(f"{place}/background", json=request).status_code == 202
+    studio.post(f"{place}/background", request, code=202)
     job = studio.ended(f"{place}/background", "job")
     assert job["state"] == "done", job
     assert job["quality"]["subjects"] == 1
-    assert studio.client.get(f"{place}/background").json()["source"] == "subject"
+    assert studio.get(f"{place}/background")["source"] == "subject"
     footage = Session(made.session.path).footage()
     mask = footage.mask("cam1", 1)
     footage.close()
@@ -229,5 +215,4 @@ def test_one_of_several_is_chosen_by_where_he_stands(studio: Studio) -> None:
 
 @pytest.mark.parametrize("place", [[1.0], ["x", 0.0], [0.0, 1.0, 2.0], 3.0])
 def test_a_place_is_two_numbers(studio: Studio, place: object) -> None:
-    refused = studio.client.post(f"{PLACE}/background", json={"source": "subject", "subject_at": place})
-    assert refused.status_code == 422
+    studio.post(f"{PLACE}/background", {"source": "subject", "subject_at": place}, code=422)

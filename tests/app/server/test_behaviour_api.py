@@ -35,7 +35,7 @@ def learnt(studio: Studio, model: BehaviourModel) -> Studio:
 
 def test_models_are_listed_and_a_damaged_one_says_why(learnt: Studio, model: BehaviourModel) -> None:
     (models_folder(learnt.workspace.root) / f"broken{SUFFIX}").write_bytes(b"nothing")
-    broken, wave = learnt.client.get("/api/behaviours").json()["models"]
+    broken, wave = learnt.get("/api/behaviours")["models"]
     assert (broken["name"], wave["name"]) == ("broken", "wave")
     assert broken["problem"]
     assert wave["entropy_test"] is None
@@ -45,7 +45,7 @@ def test_models_are_listed_and_a_damaged_one_says_why(learnt: Studio, model: Beh
 def test_clusters_are_poses_with_their_share_and_their_movement(
     learnt: Studio, model: BehaviourModel
 ) -> None:
-    response = learnt.client.get("/api/behaviours/wave").json()
+    response = learnt.get("/api/behaviours/wave")
     assert [limb["side"] for limb in response["limbs"]] == ["middle"] * 4
     assert {cluster["cluster"] for cluster in response["clusters"]} == set(range(model.clusters))
     shares = [cluster["share"] for cluster in response["clusters"]]
@@ -67,7 +67,7 @@ def test_clusters_are_poses_with_their_share_and_their_movement(
 
 
 def test_stays_and_transitions_are_counted_in_the_recordings(learnt: Studio, model: BehaviourModel) -> None:
-    response = learnt.client.get("/api/behaviours/wave").json()
+    response = learnt.get("/api/behaviours/wave")
     runs: dict[int, list[int]] = {}
     follows: dict[tuple[int, int], int] = {}
     for poses in recordings():
@@ -88,7 +88,7 @@ def test_stays_and_transitions_are_counted_in_the_recordings(learnt: Studio, mod
 
 
 def test_a_longer_memory_says_what_it_was_learnt_from_better(learnt: Studio) -> None:
-    lines = learnt.client.get("/api/behaviours/wave/entropies").json()["lines"]
+    lines = learnt.get("/api/behaviours/wave/entropies")["lines"]
     assert len(lines) == 2
     for line in lines:
         assert line["memory"][0] == 1
@@ -102,9 +102,9 @@ def test_a_longer_memory_says_what_it_was_learnt_from_better(learnt: Studio) -> 
 
 def test_a_walk_goes_along_the_automaton_and_is_the_same_again(learnt: Studio, model: BehaviourModel) -> None:
     path = "/api/behaviours/wave/walk?frames=60&seed=4"
-    walk = learnt.client.get(path).json()
-    assert walk == learnt.client.get(path).json()
-    assert walk != learnt.client.get("/api/behaviours/wave/walk?frames=60&seed=5").json() | {"seed": 4}
+    walk = learnt.get(path)
+    assert walk == learnt.get(path)
+    assert walk != learnt.get("/api/behaviours/wave/walk?frames=60&seed=5") | {"seed": 4}
     assert np.shape(walk["frames"]) == (60, 4, 2, 3)
     assert [history[-1] for history in walk["histories"]] == walk["clusters"]
     contexts = list(model.automaton.contexts)
@@ -124,18 +124,15 @@ def test_a_walk_goes_along_the_automaton_and_is_the_same_again(learnt: Studio, m
     ],
 )
 def test_what_is_not_there_is_reported(learnt: Studio, path: str, status: int) -> None:
-    answer = learnt.client.get(f"/api/behaviours/{path}")
-    assert answer.status_code == status
-    assert answer.json()["message"]
+    answer = learnt.get(f"/api/behaviours/{path}", code=status)
+    assert answer["message"]
 
 
 def test_a_model_is_renamed_and_keeps_what_it_holds(learnt: Studio) -> None:
-    before = learnt.client.get("/api/behaviours/wave").json()["clusters"]
-    assert learnt.client.patch("/api/behaviours/wave", json={"name": "greeting"}).json() == {
-        "name": "greeting"
-    }
-    assert learnt.client.get("/api/behaviours/wave").status_code == 404
-    response = learnt.client.get("/api/behaviours/greeting").json()
+    before = learnt.get("/api/behaviours/wave")["clusters"]
+    assert learnt.patch("/api/behaviours/wave", {"name": "greeting"}) == {"name": "greeting"}
+    learnt.get("/api/behaviours/wave", code=404)
+    response = learnt.get("/api/behaviours/greeting")
     assert response["model"]["name"] == "greeting"
     assert response["clusters"] == before
 
@@ -143,31 +140,30 @@ def test_a_model_is_renamed_and_keeps_what_it_holds(learnt: Studio) -> None:
 @pytest.mark.parametrize("name", ["../out", "", "a b", None])
 def test_a_model_is_not_renamed_to_what_is_no_name(learnt: Studio, name: str | None) -> None:
     assert learnt.client.patch("/api/behaviours/wave", json={"name": name}).status_code in (400, 422)
-    assert learnt.client.get("/api/behaviours/wave").status_code == 200
+    learnt.get("/api/behaviours/wave")
 
 
 def test_a_model_never_takes_the_place_of_another(learnt: Studio, model: BehaviourModel) -> None:
     folder = models_folder(learnt.workspace.root)
     write_model(model, folder / f"other{SUFFIX}")
     content = (folder / f"other{SUFFIX}").read_bytes()
-    answer = learnt.client.patch("/api/behaviours/wave", json={"name": "OTHER"})
-    assert answer.status_code == 422
-    assert "already" in answer.json()["message"]
+    answer = learnt.patch("/api/behaviours/wave", {"name": "OTHER"}, code=422)
+    assert "already" in answer["message"]
     assert (folder / f"other{SUFFIX}").read_bytes() == content
 
 
 def test_what_is_thrown_away_comes_back_from_the_trash(learnt: Studio, model: BehaviourModel) -> None:
     folder = models_folder(learnt.workspace.root)
     content = (folder / f"wave{SUFFIX}").read_bytes()
-    thrown = learnt.client.delete("/api/behaviours/wave").json()
+    thrown = learnt.delete("/api/behaviours/wave")
     assert (thrown["name"], thrown["kind"], thrown["restorable"]) == ("wave", "model", True)
-    assert learnt.client.get("/api/behaviours").json()["models"] == []
-    assert learnt.client.get("/api/trash").json()["entries"] == [thrown]
+    assert learnt.get("/api/behaviours")["models"] == []
+    assert learnt.get("/api/trash")["entries"] == [thrown]
     write_model(model, folder / f"wave{SUFFIX}")
-    back = learnt.client.post("/api/trash/restore", json={"entry": thrown["id"]}).json()
+    back = learnt.post("/api/trash/restore", {"entry": thrown["id"]})
     assert back["model"] == "wave-2"
     assert (folder / f"wave-2{SUFFIX}").read_bytes() == content
-    assert learnt.client.get("/api/trash").json()["entries"] == []
+    assert learnt.get("/api/trash")["entries"] == []
     assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
 
 
@@ -178,28 +174,27 @@ def test_a_model_without_its_body_tells_its_numbers_and_says_why(
         raise BodyError(f"There is no body '{name}'.", "Known: human25.")
 
     monkeypatch.setattr(behaviour_details, "load_body", gone)
-    response = learnt.client.get("/api/behaviours/wave").json()
+    response = learnt.get("/api/behaviours/wave")
     assert "body 'planar_arm4' no longer exists" in response["problem"]
     assert response["clusters"] == response["limbs"] == []
     assert response["model"]["states"] == model.states == sum(response["context_lengths"])
-    assert learnt.client.get("/api/behaviours/wave/entropies").json()["lines"]
-    walk = learnt.client.get("/api/behaviours/wave/walk?frames=5")
-    assert walk.status_code == 422
-    assert "no longer exists" in walk.json()["message"]
+    assert learnt.get("/api/behaviours/wave/entropies")["lines"]
+    walk = learnt.get("/api/behaviours/wave/walk?frames=5", code=422)
+    assert "no longer exists" in walk["message"]
 
 
 def test_a_body_of_the_workspaces_own_is_found(learnt: Studio, model: BehaviourModel) -> None:
     own = dataclasses.replace(model, space=dataclasses.replace(model.space, body="my_arm"))
     write_model(own, models_folder(learnt.workspace.root) / f"own{SUFFIX}")
-    assert "my_arm" in learnt.client.get("/api/behaviours/own").json()["problem"]
+    assert "my_arm" in learnt.get("/api/behaviours/own")["problem"]
     bodies = learnt.workspace.root / "bodies"
     bodies.mkdir()
     text = (resources.files("studio.body") / "models" / "planar_arm4.toml").read_text(encoding="utf-8")
     (bodies / "my_arm.toml").write_text(text.replace("planar_arm4", "my_arm"))
-    response = learnt.client.get("/api/behaviours/own").json()
+    response = learnt.get("/api/behaviours/own")
     assert response["problem"] == ""
     assert len(response["clusters"]) == model.clusters
-    assert "my_arm" in learnt.client.get("/api/learning").json()["bodies"]
+    assert "my_arm" in learnt.get("/api/learning")["bodies"]
 
 
 @pytest.mark.parametrize("page", [*RAILED, *UNRAILED])

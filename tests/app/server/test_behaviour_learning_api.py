@@ -16,20 +16,12 @@ from studio.sessions.stored_run import StoredRun
 FEW = {"most_clusters": 6, "reduced_dimensions": 3, "memory": 3, "smoothings": 2}
 
 
-def uploaded(studio: Studio, name: str, content: bytes) -> str:
-    """An upload of one file."""
-    identifier = studio.client.post("/api/uploads").json()["identifier"]
-    answer = studio.client.put(f"/api/uploads/{identifier}/files", params={"path": name}, content=content)
-    assert answer.status_code == 200, answer.text
-    return identifier
-
-
 def begin(studio: Studio, **request: object):
     return studio.client.post("/api/learning", json={"name": "sway", "body": "human31", **request})
 
 
 def test_the_form_is_reported_every_knob_once(studio: Studio) -> None:
-    response = studio.client.get("/api/learning").json()
+    response = studio.get("/api/learning")
     wanted = [entry.name for kind in (LearningSettings, OversamplingSettings) for entry in knobs_of(kind)]
     assert [entry["name"] for entry in response["knobs"]] == wanted
     assert response["default_body"] in response["bodies"]
@@ -46,20 +38,18 @@ def test_uploaded_motion_becomes_a_model(studio: Studio, tmp_path, archive: bool
         with zipfile.ZipFile(packed, "w") as made:
             made.writestr(name, content)
         content, name = packed.getvalue(), "motion.zip"
-    upload = uploaded(studio, name, content)
+    upload = studio.upload({name: content})
     answer = begin(studio, upload=upload, settings=FEW)
     assert answer.status_code == 202, answer.text
     assert begin(studio, name="other", sources=["walk"]).status_code == 409, "one at a time"
     response = studio.ended("/api/learning", "progress")
     assert response["state"] == "done", response
-    (line,) = studio.client.get("/api/behaviours").json()["models"]
+    (line,) = studio.get("/api/behaviours")["models"]
     assert (line["name"], line["body"], line["memory"]) == ("sway", "human31", 3)
     assert line["sources"] == ["sway"]
     assert response["learnt"]["clusters"] == line["clusters"]
     assert response["learnt"]["states"] == line["states"]
-    assert studio.client.get(f"/api/uploads/{upload}").status_code == 404, (
-        "an upload that was used is removed"
-    )
+    studio.get(f"/api/uploads/{upload}", code=404)
     assert begin(studio, sources=["walk"]).status_code == 422, "the name is taken"
 
 
@@ -71,18 +61,18 @@ def test_what_goes_wrong_inside_is_reported_in_words(studio: Studio, tracked: St
     assert response["state"] == "failed"
     assert "take1/first" in response["message"]
     assert "frames" in response["message"] + response["hint"]
-    assert studio.client.get("/api/behaviours").json()["models"] == []
+    assert studio.get("/api/behaviours")["models"] == []
 
 
 def test_cancelled_nothing_is_kept(studio: Studio) -> None:
-    assert studio.client.delete("/api/learning").status_code == 404
+    studio.delete("/api/learning", code=404)
     assert begin(studio, sources=["walk"]).status_code == 202
-    assert studio.client.delete("/api/learning").status_code == 202
+    studio.delete("/api/learning", code=202)
     assert studio.ended("/api/learning", "progress")["state"] == "cancelled"
     folder = models_folder(studio.workspace.root)
     assert not folder.is_dir() or not list(folder.iterdir())
     assert begin(studio, sources=["walk"]).status_code == 202, "and another one can begin"
-    studio.client.delete("/api/learning")
+    studio.delete("/api/learning")
     studio.ended("/api/learning", "progress")
 
 
@@ -105,11 +95,11 @@ def test_refusals(studio: Studio, sent: dict, status: int) -> None:
     answer = begin(studio, **sent)
     assert answer.status_code == status, answer.text
     assert answer.json()["message"]
-    assert studio.client.get("/api/learning").json()["progress"] is None
+    assert studio.get("/api/learning")["progress"] is None
 
 
 def test_an_upload_without_motion_is_refused(studio: Studio) -> None:
-    upload = uploaded(studio, "notes.txt", b"nothing that moves")
+    upload = studio.upload({"notes.txt": b"nothing that moves"})
     answer = begin(studio, upload=upload)
     assert answer.status_code == 422
     assert "no motion" in answer.json()["message"]

@@ -11,34 +11,33 @@ from studio.body.catalogue import load_body
 
 @pytest.fixture
 def session(studio: Studio) -> str:
-    root = studio.client.get("/api/sessions").json()
+    root = studio.get("/api/sessions")
     if not any(one["name"] == "toy" for one in root["sessions"]):
         make_session(studio.workspace.root / "toy")
     return "toy"
 
 
 def edit(studio: Studio, name: str, status: int = 200, **change: object) -> dict:
-    answer = studio.client.post(f"/api/bodies/{name}/edit", json=change)
-    assert answer.status_code == status, answer.text
-    return answer.json()
+    answer = studio.post(f"/api/bodies/{name}/edit", change, code=status)
+    return answer
 
 
 def test_all_bodies_are_listed_with_whose_they_are(studio: Studio, session: str) -> None:
     edit(studio, "mouse", save_as="rat")
     edit(studio, "dog", save_as="wolf", session=session)
     (studio.workspace.root / "bodies" / "broken.toml").write_text("title = 3")
-    answer = studio.client.get("/api/bodies", params={"session": session}).json()
+    answer = studio.get("/api/bodies", params={"session": session})
     own = {one["name"]: one["own"] for one in answer["bodies"]}
     assert (own["mouse"], own["rat"], own["wolf"]) == ("", "workspace", "session")
     broken = next(one for one in answer["bodies"] if one["name"] == "broken")
     assert "broken.toml" in broken["problem"]
-    assert answer["chosen"] == studio.client.get(f"/api/sessions/{session}").json()["body"]["name"]
-    without = studio.client.get("/api/bodies").json()
+    assert answer["chosen"] == studio.get(f"/api/sessions/{session}")["body"]["name"]
+    without = studio.get("/api/bodies")
     assert "wolf" not in {one["name"] for one in without["bodies"]}
 
 
 def test_a_body_has_everything_that_can_be_changed(studio: Studio) -> None:
-    detail = studio.client.get("/api/bodies/mouse").json()
+    detail = studio.get("/api/bodies/mouse")
     mouse = load_body("mouse")
     assert [one["name"] for one in detail["limbs"]] == [limb.name for limb in mouse.limbs]
     haunch = next(one for one in detail["limbs"] if one["name"] == "left haunch")
@@ -50,7 +49,7 @@ def test_a_body_has_everything_that_can_be_changed(studio: Studio) -> None:
     assert next(one for one in detail["limits"] if one["name"] == "heading")["lower"] is None
     assert detail["sided"] is True
     assert len(detail["markers"]) == len(mouse.markers)
-    assert studio.client.get("/api/bodies/planar_arm4").json()["sided"] is False
+    assert studio.get("/api/bodies/planar_arm4")["sided"] is False
 
 
 def test_an_empty_name_saves_nothing(studio: Studio) -> None:
@@ -96,34 +95,30 @@ def test_an_own_body_is_saved_chosen_and_thrown_away_when_nobody_needs_it(
     saved = edit(studio, "mouse", sizes={"loin_length": 31}, save_as="rat", session=session)
     assert saved["saved"] == "rat"
     assert (studio.workspace.root / session / "bodies" / "rat.toml").is_file()
-    chosen = studio.client.put(f"/api/sessions/{session}/subject", json={"body": "rat"})
-    assert chosen.status_code == 200, chosen.text
-    assert chosen.json()["dimensions"]["loin_length"] == 31.0
+    chosen = studio.put(f"/api/sessions/{session}/subject", {"body": "rat"})
+    assert chosen["dimensions"]["loin_length"] == 31.0
     # In the session it begins in its subject's size, and a new run may have it.
-    assert studio.client.get("/api/bodies/rat", params={"session": session}).json()["name"] == "rat"
-    refused = studio.client.delete("/api/bodies/rat", params={"session": session})
-    assert session in refused.json()["message"]
-    studio.client.put(f"/api/sessions/{session}/subject", json={"body": "mouse"})
-    gone = studio.client.delete("/api/bodies/rat", params={"session": session})
-    assert gone.status_code == 200
-    assert list(studio.workspace.root.rglob(gone.json()["trash"]))
+    assert studio.get("/api/bodies/rat", params={"session": session})["name"] == "rat"
+    refused = studio.delete("/api/bodies/rat", code=422, params={"session": session})
+    assert session in refused["message"]
+    studio.put(f"/api/sessions/{session}/subject", {"body": "mouse"})
+    gone = studio.delete("/api/bodies/rat", params={"session": session})
+    assert list(studio.workspace.root.rglob(gone["trash"]))
     assert not (studio.workspace.root / session / "bodies" / "rat.toml").exists()
-    assert studio.client.put(f"/api/sessions/{session}/subject", json={}).status_code == 422
+    studio.put(f"/api/sessions/{session}/subject", {}, code=422)
 
 
 def test_the_scene_shows_a_body_that_is_being_made(studio: Studio, session: str) -> None:
     text = edit(studio, "mouse", sizes={"loin_length": 31})["text"]
-    answer = studio.client.post("/api/scene/show", json={"session": session, "body": text})
-    assert answer.status_code == 204, answer.text
+    studio.post("/api/scene/show", {"session": session, "body": text}, code=204)
     what, where, (_, dimensions) = studio.stage.calls[-1]
     assert (what, where, dimensions["loin_length"]) == ("try_body", session, 31.0)
-    wrong = studio.client.post("/api/scene/show", json={"body": "title = 3"})
-    assert wrong.status_code == 422
+    studio.post("/api/scene/show", {"body": "title = 3"}, code=422)
     assert studio.stage.calls[-1][0] == "try_body"
 
 
 def test_a_broken_upload_names_the_entry(studio: Studio) -> None:
     text = Path(load_body.__code__.co_filename).with_name("models") / "mouse.toml"
     broken = text.read_text().replace('parent = "skull"', 'parent = "wing"', 1)
-    answer = studio.client.post("/api/bodies/mine/edit", json={"text": broken})
-    assert "wing" in answer.json()["message"]
+    answer = studio.post("/api/bodies/mine/edit", {"text": broken}, code=422)
+    assert "wing" in answer["message"]

@@ -42,20 +42,10 @@ def fresh(studio: Studio, takes: Path) -> Studio:
     return studio
 
 
-def uploaded(studio: Studio, files: dict[str, bytes]) -> str:
-    """An upload of these files."""
-    identifier = studio.client.post("/api/uploads").json()["identifier"]
-    for name, content in files.items():
-        place = f"/api/uploads/{identifier}/files"
-        assert studio.client.put(place, params={"path": name}, content=content).status_code == 200
-    return identifier
-
-
 def solved(studio: Studio, request: dict, session: str = "fresh") -> dict:
     """The state of a calibration from boards when it has ended."""
-    begun = studio.client.post(f"/api/sessions/{session}/calibration/solve", json=request)
-    assert begun.status_code == 202, begun.text
-    return studio.ended(f"/api/calibrations/{begun.json()['identifier']}")
+    begun = studio.post(f"/api/sessions/{session}/calibration/solve", request, code=202)
+    return studio.ended(f"/api/calibrations/{begun['identifier']}")
 
 
 @pytest.mark.slow
@@ -64,18 +54,17 @@ def test_a_tilted_world_is_levelled_as_a_proposal(studio: Studio) -> None:
     tilt = rigid(cv2.Rodrigues(np.array([np.radians(12.0), 0.0, 0.0]))[0], np.array([0.0, 0.0, 300.0]))
     write_calibration(moved_cameras(true_cameras(), tilt), session.path / CAMERAS_PATH)
     here = "/api/sessions/askew/calibration"
-    assert "tilted-world" in {one["code"] for one in studio.client.get(here).json()["present"]["findings"]}
-    begun = studio.client.post(f"{here}/level", json={})
-    assert begun.status_code == 202, begun.text
-    ended = studio.ended(f"/api/calibrations/{begun.json()['identifier']}")
+    assert "tilted-world" in {one["code"] for one in studio.get(here)["present"]["findings"]}
+    begun = studio.post(f"{here}/level", {}, code=202)
+    ended = studio.ended(f"/api/calibrations/{begun['identifier']}")
     assert ended["state"] == "done", ended
-    proposal = studio.client.get(f"{here}/proposals/{ended['proposal']}").json()
+    proposal = studio.get(f"{here}/proposals/{ended['proposal']}")
     assert proposal["findings"] == []
     assert "turned by 12.0 degrees" in " ".join(proposal["notes"])
-    used = studio.client.post(f"{here}/proposals/{ended['proposal']}/apply", json={}).json()
+    used = studio.post(f"{here}/proposals/{ended['proposal']}/apply", {})
     assert used["present"]["findings"] == []
     assert "floor from the cameras' vertical" in used["present"]["source"]
-    assert studio.client.post(f"{here}/level", json={"run": "none"}).status_code == 404
+    studio.post(f"{here}/level", {"run": "none"}, code=404)
 
 
 def decoded(content: bytes) -> np.ndarray:
@@ -103,23 +92,22 @@ def turned_up(session: Session, axis: str = "y") -> bytes:
 def test_a_file_is_shown_confirmed_and_kept_apart_from_the_one_before(
     studio: Studio, session: Session, tracked: StoredRun
 ) -> None:
-    before = studio.client.get(TAKE).json()
+    before = studio.get(TAKE)
     assert [camera["name"] for camera in before["present"]["cameras"]] == ["cam1", "cam2"]
     assert before["earlier"] == []
-    upload = uploaded(studio, {"Calib_other.toml": turned_up(session)})
-    seen = studio.client.post(f"{TAKE}/proposals", json={"upload": upload}).json()
+    upload = studio.upload({"Calib_other.toml": turned_up(session)})
+    seen = studio.post(f"{TAKE}/proposals", {"upload": upload})
     assert "in m" in seen["unit_note"]
     assert [finding["code"] for finding in seen["findings"] if finding["severity"] == "blocks"] == ["up-axis"]
     assert not seen["usable"]
-    refused = studio.client.post(f"{TAKE}/proposals/{seen['identifier']}/apply", json={})
-    assert refused.status_code == 422
-    assert "Y axis points up" in refused.json()["message"]
-    assert studio.client.get(TAKE).json() == before
-    right = studio.client.post(f"{TAKE}/proposals", json={"upload": upload, "up": "y", "unit": "m"}).json()
+    refused = studio.post(f"{TAKE}/proposals/{seen['identifier']}/apply", {}, code=422)
+    assert "Y axis points up" in refused["message"]
+    assert studio.get(TAKE) == before
+    right = studio.post(f"{TAKE}/proposals", {"upload": upload, "up": "y", "unit": "m"})
     assert right["usable"]
     assert right["matching"][0] == {"footage": "cam1", "camera": "Camera_1", "how": "same normalised name"}
     original = (session.path / "calibration" / "cameras.toml").read_bytes()
-    response = studio.client.post(f"{TAKE}/proposals/{right['identifier']}/apply", json={}).json()
+    response = studio.post(f"{TAKE}/proposals/{right['identifier']}/apply", {})
     assert response["present"]["source"] == "Calib_other.toml"
     assert response["changed"]
     assert response["stale_runs"] == ["first"]
@@ -135,22 +123,22 @@ def test_a_file_is_shown_confirmed_and_kept_apart_from_the_one_before(
 
 def test_an_earlier_one_comes_back(studio: Studio, session: Session) -> None:
     original = (session.path / "calibration" / "cameras.toml").read_bytes()
-    upload = uploaded(studio, {"Calib_other.toml": turned_up(session)})
+    upload = studio.upload({"Calib_other.toml": turned_up(session)})
     request = {"upload": upload, "up": "y"}
-    made = studio.client.post(f"{TAKE}/proposals", json=request).json()
-    response = studio.client.post(f"{TAKE}/proposals/{made['identifier']}/apply", json={}).json()
-    back = studio.client.post(f"{TAKE}/proposals", json={"earlier": response["earlier"][0]}).json()
-    again = studio.client.post(f"{TAKE}/proposals/{back['identifier']}/apply", json={}).json()
+    made = studio.post(f"{TAKE}/proposals", request)
+    response = studio.post(f"{TAKE}/proposals/{made['identifier']}/apply", {})
+    back = studio.post(f"{TAKE}/proposals", {"earlier": response["earlier"][0]})
+    again = studio.post(f"{TAKE}/proposals/{back['identifier']}/apply", {})
     assert len(again["earlier"]) == 2
     assert (session.path / "calibration" / "cameras.toml").read_bytes() == original
 
 
 def test_what_blocks_can_be_used_if_requested(studio: Studio, session: Session) -> None:
-    upload = uploaded(studio, {"Calib_other.toml": turned_up(session)})
-    seen = studio.client.post(f"{TAKE}/proposals", json={"upload": upload}).json()
+    upload = studio.upload({"Calib_other.toml": turned_up(session)})
+    seen = studio.post(f"{TAKE}/proposals", {"upload": upload})
     address = f"{TAKE}/proposals/{seen['identifier']}/apply"
-    assert studio.client.post(address, json={"anyway": True}).status_code == 200
-    present = studio.client.get(TAKE).json()["present"]
+    studio.post(address, {"anyway": True})
+    present = studio.get(TAKE)["present"]
     assert present["findings"][0]["code"] == "up-axis"
 
 
@@ -170,11 +158,10 @@ def test_what_blocks_can_be_used_if_requested(studio: Studio, session: Session) 
 def test_what_is_no_calibration(
     studio: Studio, files: dict[str, bytes] | None, sent: dict, status: int, said: str
 ) -> None:
-    upload = {} if files is None else {"upload": uploaded(studio, files)}
-    answer = studio.client.post(f"{TAKE}/proposals", json={**upload, **sent})
-    assert answer.status_code == status, answer.text
-    assert said in answer.json()["message"]
-    assert answer.json()["hint"]
+    upload = {} if files is None else {"upload": studio.upload(files)}
+    answer = studio.post(f"{TAKE}/proposals", {**upload, **sent}, code=status)
+    assert said in answer["message"]
+    assert answer["hint"]
 
 
 def test_boards_give_cameras_pictures_and_a_calibration(fresh: Studio, takes: Path, tmp_path: Path) -> None:
@@ -183,7 +170,7 @@ def test_boards_give_cameras_pictures_and_a_calibration(fresh: Studio, takes: Pa
     assert response["state"] == "done", response
     assert response["share"] == 1.0
     here = f"{FRESH}/proposals/{response['proposal']}"
-    made = fresh.client.get(here).json()
+    made = fresh.get(here)
     assert made["usable"], made["findings"]
     assert made["floor"] == f"board on the floor in frame {FLOOR_FRAME}"
     for camera, found in zip(CAMERAS, made["cameras"], strict=True):
@@ -205,11 +192,11 @@ def test_boards_give_cameras_pictures_and_a_calibration(fresh: Studio, takes: Pa
     )
     around = drawn[end[1] - 4 : end[1] + 5, end[0] - 4 : end[0] + 5]
     assert (around[..., 2] - around[..., 0]).max() > 100, "the X axis is red there"
-    applied = fresh.client.post(f"{here}/apply", json={}).json()
+    applied = fresh.post(f"{here}/apply", {})
     assert applied["present"]["source"].startswith("ChArUco board 6x5, 0.")
     folder = fresh.workspace.session("fresh").path / "calibration"
     assert (folder / "cameras.report.json").exists()
-    assert fresh.client.get(f"{FRESH}/proposals/current/coverage/cam2.png").status_code == 200
+    fresh.get(f"{FRESH}/proposals/current/coverage/cam2.png")
     for form, reader in (("pose2sim", "Calib_fresh.toml"), ("aniposelib", "calibration.toml")):
         answer = fresh.client.get(f"{FRESH}/export", params={"format": form})
         assert reader in answer.headers["content-disposition"]
@@ -238,15 +225,15 @@ def test_points_clicked_in_two_views_are_the_floor(studio: Studio, session: Sess
     floor = np.array([[0.0, 0.0, 0.0], [700.0, 0.0, 0.0], [700.0, 500.0, 0.0], [0.0, 600.0, 0.0]])
     seen = {camera.name: project(camera, floor)[0] for camera in true}
     points = [{"pixels": {name: seen[name][k].tolist() for name in seen}} for k in range(4)]
-    made = studio.client.post(f"{TAKE}/floor", json={"points": points}).json()
+    made = studio.post(f"{TAKE}/floor", {"points": points})
     for camera, found in zip(true, made["cameras"], strict=True):
         np.testing.assert_allclose(found["position"], camera.centre, atol=0.1)
     np.testing.assert_allclose([point["place"] for point in made["points"]], floor, atol=0.1)
     assert max(off for point in made["points"] for off in point["missed_px"].values()) < 0.01
     view = studio.client.get(f"{TAKE}/proposals/{made['identifier']}/views/cam2.jpg")
     assert view.headers["content-type"] == "image/jpeg"
-    assert studio.client.get(TAKE).json()["earlier"] == []
-    response = studio.client.post(f"{TAKE}/proposals/{made['identifier']}/apply", json={}).json()
+    assert studio.get(TAKE)["earlier"] == []
+    response = studio.post(f"{TAKE}/proposals/{made['identifier']}/apply", {})
     assert "floor from 4 clicked points" in response["present"]["source"]
     np.testing.assert_allclose(Session(session.path).cameras()[0].centre, true[0].centre, atol=0.1)
 
@@ -255,24 +242,20 @@ def test_clicks_that_are_no_floor(studio: Studio, session: Session) -> None:
     line = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0], [600.0, 0.0, 0.0]])
     seen = {camera.name: project(camera, line)[0] for camera in session.cameras()}
     points = [{"pixels": {name: seen[name][k].tolist() for name in seen}} for k in range(3)]
-    answer = studio.client.post(f"{TAKE}/floor", json={"points": points})
-    assert answer.status_code == 422
-    assert "on a line" in answer.json()["message"]
-    assert studio.client.post(f"{TAKE}/floor", json={"points": points[:2]}).status_code == 422
+    answer = studio.post(f"{TAKE}/floor", {"points": points}, code=422)
+    assert "on a line" in answer["message"]
+    studio.post(f"{TAKE}/floor", {"points": points[:2]}, code=422)
     single = [{"pixels": {"cam1": [1.0, 2.0]}}] * 3
-    assert studio.client.post(f"{TAKE}/floor", json={"points": single}).status_code == 422
+    studio.post(f"{TAKE}/floor", {"points": single}, code=422)
 
 
 def test_solving_can_be_stopped_and_failures_are_in_words(
     fresh: Studio, takes: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     here = {"path": str(takes)}
-    assert (
-        fresh.client.post(f"{FRESH}/solve", json={"board": "circles:3", "footage": here}).status_code == 422
-    )
-    lacking = fresh.client.post(f"{FRESH}/solve", json={"board": BOARD.text})
-    assert lacking.status_code == 422
-    assert "no board footage" in lacking.json()["message"]
+    fresh.post(f"{FRESH}/solve", {"board": "circles:3", "footage": here}, code=422)
+    lacking = fresh.post(f"{FRESH}/solve", {"board": BOARD.text}, code=422)
+    assert "no board footage" in lacking["message"]
     other = solved(
         fresh, {"board": "charuco:5x4,30,20,DICT_5X5_100", "extrinsics": {"path": str(takes / "extrinsics")}}
     )
@@ -286,23 +269,22 @@ def test_solving_can_be_stopped_and_failures_are_in_words(
             progress("Looking for the board, camera cam1", 1, 10)
 
     monkeypatch.setattr(calibration_proposals, "solve_boards", waits)
-    begun = fresh.client.post(f"{FRESH}/solve", json={"board": BOARD.text, "footage": here}).json()
-    assert fresh.client.delete(f"/api/calibrations/{begun['identifier']}").status_code == 202
+    begun = fresh.post(f"{FRESH}/solve", {"board": BOARD.text, "footage": here})
+    fresh.delete(f"/api/calibrations/{begun['identifier']}", code=202)
     deadline = time.monotonic() + PATIENCE
     response = begun
     while response["state"] in ("queued", "running", "cancelling") and time.monotonic() < deadline:
-        response = fresh.client.get(f"/api/calibrations/{begun['identifier']}").json()
+        response = fresh.get(f"/api/calibrations/{begun['identifier']}")
     assert (response["state"], response["code"]) == ("cancelled", "cancelled")
-    assert fresh.client.get(FRESH).json()["present"] is None
+    assert fresh.get(FRESH)["present"] is None
 
 
 def test_a_board_to_print(studio: Studio) -> None:
     answer = studio.client.get("/api/calibration-boards.pdf", params={"kind": "chessboard", "page": "a3"})
     assert answer.content.startswith(b"%PDF")
     assert answer.headers["x-studio-board"].startswith("chessboard:9x6,")
-    large = studio.client.get("/api/calibration-boards.pdf", params={"board": "chessboard:9x6,200"})
-    assert large.status_code == 422
-    assert "does not fit" in large.json()["message"]
+    large = studio.get("/api/calibration-boards.pdf", params={"board": "chessboard:9x6,200"}, code=422)
+    assert "does not fit" in large["message"]
 
 
 @pytest.mark.slow
@@ -319,9 +301,9 @@ def test_lenses_of_the_balancing_mans_cameras(studio: Studio, real_data: Path) -
     )
     assert response["state"] == "done", response
     here = f"{FRESH}/proposals/{response['proposal']}"
-    made = studio.client.get(here).json()
+    made = studio.get(here)
     assert made["findings"][0]["code"] == "no-places"
-    assert studio.client.post(f"{here}/apply", json={}).status_code == 422
+    studio.post(f"{here}/apply", {}, code=422)
     assert [lens["name"] for lens in made["report"]["cameras"]] == ["cam01", "cam02", "cam03", "cam04"]
     for lens in made["report"]["cameras"]:
         true = given[lens["name"][-2:]].matrix[0, 0]
@@ -329,4 +311,4 @@ def test_lenses_of_the_balancing_mans_cameras(studio: Studio, real_data: Path) -
         assert abs(lens["focal_px"][0] / true - 1.0) < 0.03 or said & {"coverage", "few-pictures"}
         assert "few-pictures" in said
         assert len(lens["pictures"]) >= 6
-        assert studio.client.get(f"{here}/coverage/{lens['name']}.png").status_code == 200
+        studio.get(f"{here}/coverage/{lens['name']}.png")

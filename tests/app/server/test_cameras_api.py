@@ -29,7 +29,7 @@ def streams() -> Iterator[Streams]:
 def until(studio: Studio, path: str, done: Callable[[dict], bool]) -> dict:
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
-        response = studio.client.get(path).json()
+        response = studio.get(path)
         if done(response):
             return response
     raise AssertionError(f"{path}: {response}")
@@ -40,8 +40,7 @@ def shown(studio: Studio, streams: Streams) -> dict:
     request = {
         "cameras": [{"name": "cam1", "address": secret}, {"name": "cam2", "address": streams.address("cam2")}]
     }
-    answer = studio.client.post("/api/cameras/preview", json=request)
-    assert answer.status_code == 200, answer.text
+    studio.post("/api/cameras/preview", request)
     return until(
         studio,
         "/api/cameras",
@@ -68,8 +67,8 @@ def test_cameras_are_looked_at(studio: Studio, streams: Streams) -> None:
     assert studio.client.get("/api/cameras/cam1.jpg").content in [
         bytes(one) for one in streams.pictures["cam1"]
     ]
-    assert studio.client.get("/api/cameras/cam7.jpg").status_code == 404
-    closed = studio.client.post("/api/cameras/preview", json={"cameras": []}).json()
+    studio.get("/api/cameras/cam7.jpg", code=404)
+    closed = studio.post("/api/cameras/preview", {"cameras": []})
     assert closed["cameras"] == []
 
 
@@ -86,18 +85,16 @@ def test_a_stream_that_stops_is_reported(studio: Studio, streams: Streams) -> No
 @pytest.mark.slow
 def test_cameras_are_recorded_into_a_session(studio: Studio, streams: Streams) -> None:
     shown(studio, streams)
-    assert studio.client.post("/api/recordings/stop").status_code == 404
-    answer = studio.client.post("/api/recordings", json={"name": "take2", "calibration": "take1"})
-    assert answer.status_code == 202, answer.text
-    again = studio.client.post("/api/recordings", json={"name": "take3", "calibration": "take1"})
-    assert again.status_code == 409
-    assert studio.client.post("/api/cameras/preview", json={"cameras": []}).status_code == 409
+    studio.post("/api/recordings/stop", code=404)
+    studio.post("/api/recordings", {"name": "take2", "calibration": "take1"}, code=202)
+    studio.post("/api/recordings", {"name": "take3", "calibration": "take1"}, code=409)
+    studio.post("/api/cameras/preview", {"cameras": []}, code=409)
     until(
         studio,
         "/api/recordings",
         lambda response: response["step"] == "recording" and response["seconds"] > 0.7,
     )
-    assert studio.client.post("/api/recordings/stop").status_code == 202
+    studio.post("/api/recordings/stop", code=202)
     response = until(studio, "/api/recordings", lambda response: response["state"] in ("done", "failed"))
     assert response["state"] == "done", response
     assert "ms apart" in response["words"]
@@ -105,8 +102,7 @@ def test_cameras_are_recorded_into_a_session(studio: Studio, streams: Streams) -
     assert [camera.name for camera in made.manifest.footage.cameras] == ["cam1", "cam2"]
     assert made.manifest.frame_count >= 10
     assert not (made.path.parent / "take2.recording").exists()
-    taken = studio.client.post("/api/recordings", json={"name": "take2", "calibration": "take1"})
-    assert taken.status_code == 409
+    studio.post("/api/recordings", {"name": "take2", "calibration": "take1"}, code=409)
 
 
 @pytest.mark.parametrize(
@@ -123,11 +119,10 @@ def test_cameras_are_recorded_into_a_session(studio: Studio, streams: Streams) -
     ],
 )
 def test_what_is_no_camera_is_refused(studio: Studio, address: str, status: int) -> None:
-    answer = studio.client.post(
-        "/api/cameras/preview", json={"cameras": [{"name": "cam1", "address": address}]}
+    answer = studio.post(
+        "/api/cameras/preview", {"cameras": [{"name": "cam1", "address": address}]}, code=status
     )
-    assert answer.status_code == status, answer.text
-    assert answer.json()["hint"]
+    assert answer["hint"]
 
 
 def test_the_studio_does_not_look_at_itself(studio: Studio) -> None:
@@ -139,10 +134,9 @@ def test_the_studio_does_not_look_at_itself(studio: Studio) -> None:
 
 def test_nothing_is_recorded_without_cameras_or_of_other_names(studio: Studio, streams: Streams) -> None:
     request = {"name": "take2", "calibration": "take1"}
-    assert studio.client.post("/api/recordings", json=request).status_code == 409
-    assert studio.client.post("/api/recordings", json=request | {"name": "../x"}).status_code == 422
+    studio.post("/api/recordings", request, code=409)
+    studio.post("/api/recordings", request | {"name": "../x"}, code=422)
     wrong = {"cameras": [{"name": "left", "address": streams.address("cam1")}]}
-    assert studio.client.post("/api/cameras/preview", json=wrong).status_code == 200
-    answer = studio.client.post("/api/recordings", json=request)
-    assert answer.status_code == 422
-    assert "Camera left is not in 'cameras.toml'" in answer.json()["message"]
+    studio.post("/api/cameras/preview", wrong)
+    answer = studio.post("/api/recordings", request, code=422)
+    assert "Camera left is not in 'cameras.toml'" in answer["message"]

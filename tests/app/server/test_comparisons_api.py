@@ -38,7 +38,7 @@ def until(studio: Studio, name: str, *statuses: str) -> dict:
     """The comparison when it has come to one of these states."""
     deadline = time.monotonic() + waiting.PATIENCE
     while time.monotonic() < deadline:
-        response = studio.client.get(f"/api/comparisons/walk/{name}").json()
+        response = studio.get(f"/api/comparisons/walk/{name}")
         if response["comparison"]["status"] in statuses:
             return response
         time.sleep(0.05)
@@ -110,20 +110,20 @@ def test_an_interrupted_one_is_offered_to_go_on(compared: Studio) -> None:
     session = compared.workspace.session("walk")
     plan = plan_comparison(session, Lineup(("annealed",), "", 60, 3), (0,), last=2)
     new_comparison(place_of(session), plan)
-    (line,) = compared.client.get("/api/comparisons").json()["comparisons"]
+    (line,) = compared.get("/api/comparisons")["comparisons"]
     assert (line["status"], line["done"], line["total"]) == ("interrupted", 0, 1)
-    assert compared.client.post("/api/comparisons/walk/comparison-1/resume").status_code == 202
+    compared.post("/api/comparisons/walk/comparison-1/resume", code=202)
     assert until(compared, "comparison-1", "done")["comparison"]["best"] == "annealed"
 
 
 @pytest.mark.slow
 def test_a_server_that_ends_leaves_it_to_go_on(compared: Studio) -> None:
-    compared.client.post("/api/comparisons", json={**WISH, "seeds": 40})
+    compared.post("/api/comparisons", {**WISH, "seeds": 40})
     deadline = time.monotonic() + waiting.PATIENCE
-    while compared.client.get("/api/comparisons").json()["comparisons"][0]["done"] == 0:
+    while compared.get("/api/comparisons")["comparisons"][0]["done"] == 0:
         assert time.monotonic() < deadline
     compared.app.state.studio.jobs.close()
-    (line,) = compared.client.get("/api/comparisons").json()["comparisons"]
+    (line,) = compared.get("/api/comparisons")["comparisons"]
     assert line["status"] == "interrupted"
     assert 1 <= line["done"] < 80
 
@@ -134,7 +134,7 @@ def test_what_fails_is_said(compared: Studio) -> None:
     plan = plan_comparison(session, Lineup(("annealed",), "", 60, 3), (0,), last=2)
     wrong = replace(plan.candidates[0], changes={"survivor": 1})
     new_comparison(place_of(session), replace(plan, candidates=(wrong,)))
-    assert compared.client.post("/api/comparisons/walk/comparison-1/resume").status_code == 202
+    compared.post("/api/comparisons/walk/comparison-1/resume", code=202)
     assert "survivor" in until(compared, "comparison-1", "failed")["comparison"]["problem"]
 
 
@@ -160,10 +160,9 @@ def test_what_fails_is_said(compared: Studio) -> None:
 def test_what_cannot_be_compared_is_refused_and_nothing_is_made(
     compared: Studio, change: dict, status: int, words: str
 ) -> None:
-    answer = compared.client.post("/api/comparisons", json={**WISH, **change})
-    assert answer.status_code == status, answer.text
-    assert answer.json().keys() == {"code", "message", "hint", "status"}
-    assert words in answer.json()["message"] + answer.json()["hint"]
+    answer = compared.post("/api/comparisons", {**WISH, **change}, code=status)
+    assert answer.keys() == {"code", "message", "hint", "status"}
+    assert words in answer["message"] + answer["hint"]
     assert not (compared.workspace.root / "walk" / "comparisons").exists()
 
 
@@ -173,7 +172,7 @@ def test_addresses_lead_nowhere_else(compared: Studio) -> None:
 
 
 def test_who_can_take_part_is_reported(studio: Studio) -> None:
-    response = studio.client.get("/api/comparisons/choices").json()
+    response = studio.get("/api/comparisons/choices")
     names = {entry["name"]: entry for entry in response["candidates"]}
     assert {"annealed", "condensation", "swarm", "annealed:eq13"} <= names.keys()
     assert names["annealed:eq13"]["changes"]["adaptive_diffusion"] is False
@@ -191,20 +190,20 @@ def test_the_pages_are_served(studio: Studio) -> None:
 
 
 def test_reports_are_those_of_the_workspace(studio: Studio) -> None:
-    assert studio.client.get("/api/reports").json() == {"software": "", "date": "", "experiments": []}
-    assert studio.client.get("/api/reports/results.json").status_code == 404
+    assert studio.get("/api/reports") == {"software": "", "date": "", "experiments": []}
+    studio.get("/api/reports/results.json", code=404)
     folder = studio.workspace.root / "reproduction"
     folder.mkdir()
     results = {"software": "0.1.0", "date": "2026-11-21", "experiments": [{"name": "table-2", "numbers": []}]}
     (folder / "results.json").write_text(json.dumps(results))
-    assert studio.client.get("/api/reports").json() == results
+    assert studio.get("/api/reports") == results
     download = studio.client.get("/api/reports/results.json")
     assert download.json() == results
     assert "attachment" in download.headers["content-disposition"]
     for name in ("reproduction.lock", "..%2fsession.json", "trials"):
-        assert studio.client.get(f"/api/reports/{name}").status_code == 404
+        studio.get(f"/api/reports/{name}", code=404)
     (folder / "results.json").write_text("{")
-    assert studio.client.get("/api/reports").status_code == 409
+    studio.get("/api/reports", code=409)
 
 
 SWEEP = {
@@ -274,20 +273,20 @@ def test_an_experiment_is_run_from_the_page(studio: Studio, monkeypatch: pytest.
 
     monkeypatch.setattr(report_routes, "known_experiments", Waiting)
     place = "/api/reports/experiments"
-    listed = studio.client.get(place).json()
+    listed = studio.get(place)
     assert listed["job"] is None
     names = [one["name"] for one in listed["experiments"]]
     assert "deutscher-fig-8" in names
-    assert studio.client.post(place, json={"name": "no-such"}).status_code == 404
+    studio.post(place, {"name": "no-such"}, code=404)
     try:
         begun = studio.client.post(place, json={"name": "deutscher-fig-8"})
         assert begun.status_code == 202
-        assert studio.client.post(place, json={"name": "all"}).status_code == 409
-        [line] = studio.client.get("/api/jobs", params={"kind": "reproduction"}).json()["jobs"]
+        studio.post(place, {"name": "all"}, code=409)
+        [line] = studio.get("/api/jobs", params={"kind": "reproduction"})["jobs"]
         assert (line["name"], line["page"]) == ("deutscher-fig-8", "/reports")
     finally:
         go.set()
-    waiting.until(lambda: studio.client.get(place).json()["job"]["state"] == "done")
-    job = studio.client.get(place).json()["job"]
+    waiting.until(lambda: studio.get(place)["job"]["state"] == "done")
+    job = studio.get(place)["job"]
     assert (job["measured"], job["kept"], job["failed"]) == (5, 2, 0)
     assert asked == [("deutscher-fig-8", studio.workspace.root / "reproduction", True, None)]

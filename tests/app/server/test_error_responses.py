@@ -50,20 +50,20 @@ def test_refusals_of_the_api(studio: Studio, tracked: StoredRun, method: str, pa
 
 
 def test_a_body_that_is_no_json_is_named(studio: Studio) -> None:
-    answer = studio.client.post("/api/imports", content=b"{", headers={"content-type": "application/json"})
-    assert answer.status_code == 422
-    assert set(answer.json()) == ENTRIES
+    answer = studio.post("/api/imports", content=b"{", headers={"content-type": "application/json"}, code=422)
+    assert set(answer) == ENTRIES
 
 
 @pytest.mark.parametrize("content", [b"\xef\xeb", b"\xff" * 9, b"[" * 200_000], ids=["cut", "bytes", "deep"])
 def test_a_body_that_is_no_text_is_answered_as_the_api_declares(studio: Studio, content: bytes) -> None:
-    answer = studio.client.post("/api/imports", content=content, headers={"content-type": "application/json"})
-    assert answer.status_code == 422
-    assert answer.json()["hint"]
+    answer = studio.post(
+        "/api/imports", content=content, headers={"content-type": "application/json"}, code=422
+    )
+    assert answer["hint"]
 
 
 def test_a_wrong_entry_is_named_with_its_place(studio: Studio) -> None:
-    response = studio.client.post("/api/imports", json={"name": "a", "source": "/x", "fps": "fast"}).json()
+    response = studio.post("/api/imports", {"name": "a", "source": "/x", "fps": "fast"}, code=422)
     assert "'fps'" in response["message"]
     assert (
         validation_words([{"loc": ("body", "a", 0), "msg": "no"}]) == "The request is not valid: 'a.0': no."
@@ -92,7 +92,7 @@ def test_an_unforeseen_fault_is_reported_in_words_and_logged_whole(
     assert str(studio.log_path) in response["hint"]
     assert "Traceback" not in answer.text
     assert "Traceback" in records.text
-    assert studio.client.get("/api/worker").status_code == 200
+    studio.get("/api/worker")
 
 
 @pytest.mark.parametrize(
@@ -112,9 +112,8 @@ def test_whatever_a_request_stumbles_over_a_session_that_was_renamed_meanwhile_i
         raise error
 
     monkeypatch.setattr(subject_routes, "write_subject", moved)
-    answer = studio.client.put("/api/sessions/take1/subject", json={"height_mm": 1800})
-    assert answer.status_code == 404
-    assert answer.json()["message"] == "Session 'take1' was renamed or deleted meanwhile."
+    answer = studio.put("/api/sessions/take1/subject", {"height_mm": 1800}, code=404)
+    assert answer["message"] == "Session 'take1' was renamed or deleted meanwhile."
 
 
 def test_errors_of_the_studio_keep_their_words() -> None:

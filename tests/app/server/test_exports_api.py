@@ -13,13 +13,12 @@ RUN = "/api/sessions/take1/runs/first"
 
 
 def exported(studio: Studio, form: str, **options: object) -> dict:
-    answer = studio.client.post(f"{RUN}/exports", json={"format": form, "options": options})
-    assert answer.status_code == 202, answer.text
-    return studio.ended(f"/api/exports/{answer.json()['identifier']}")
+    answer = studio.post(f"{RUN}/exports", {"format": form, "options": options}, code=202)
+    return studio.ended(f"/api/exports/{answer['identifier']}")
 
 
 def test_choices_say_what_opens_each_format(studio: Studio) -> None:
-    response = studio.client.get("/api/exports/choices").json()
+    response = studio.get("/api/exports/choices")
     assert [form["name"] for form in response["formats"]] == list(FORMATS)
     assert all(form["opens"].endswith(".") for form in response["formats"])
     names = {option["name"] for option in response["options"]}
@@ -33,7 +32,7 @@ def test_a_file_is_made_listed_downloaded_and_deleted(studio: Studio, tracked: S
     assert response["result"]["checked"].startswith("read back within")
     file = response["result"]["file"]
     assert file == "take1-first-cm.bvh"
-    listed = studio.client.get(f"{RUN}/exports").json()
+    listed = studio.get(f"{RUN}/exports")
     assert [entry["file"] for entry in listed["exports"]] == [file]
     assert listed["running"] == []
     assert listed["tracks"] == ["raw"]
@@ -44,9 +43,9 @@ def test_a_file_is_made_listed_downloaded_and_deleted(studio: Studio, tracked: S
     assert answer.headers["content-disposition"] == f'attachment; filename="{file}"'
     assert len(answer.content) == response["result"]["bytes"]
     assert (tracked.folder / "exports" / file).is_file()
-    assert studio.client.delete(f"{RUN}/exports/{file}").status_code == 204
-    assert studio.client.get(f"{RUN}/exports").json()["exports"] == []
-    assert studio.client.get(f"{RUN}/exports/{file}").status_code == 404
+    studio.delete(f"{RUN}/exports/{file}", code=204)
+    assert studio.get(f"{RUN}/exports")["exports"] == []
+    studio.get(f"{RUN}/exports/{file}", code=404)
 
 
 def test_videos_of_all_cameras_come_as_one_zip(studio: Studio, tracked: StoredRun) -> None:
@@ -78,9 +77,8 @@ def test_the_scene_is_exported_as_a_page(studio: Studio, tracked: StoredRun) -> 
 def test_wrong_requests_are_refused_at_once(
     studio: Studio, tracked: StoredRun, sent: dict, status: int, words: str
 ) -> None:
-    answer = studio.client.post(f"{RUN}/exports", json=sent)
-    assert answer.status_code == status
-    response = answer.json()
+    answer = studio.post(f"{RUN}/exports", sent, code=status)
+    response = answer
     assert words in response["message"]
     assert response["hint"]
 
@@ -92,7 +90,7 @@ def test_what_fails_later_says_why(studio: Studio, tracked: StoredRun) -> None:
     assert "no frame from 50" in response["message"]
     assert response["hint"]
     assert exported(studio, "trc", track="smooth")["code"] == "not-found"
-    assert studio.client.get(f"{RUN}/exports").json()["exports"] == []
+    assert studio.get(f"{RUN}/exports")["exports"] == []
 
 
 def test_names_from_outside_lead_nowhere(studio: Studio, tracked: StoredRun) -> None:
@@ -107,14 +105,13 @@ def test_names_from_outside_lead_nowhere(studio: Studio, tracked: StoredRun) -> 
     ):
         assert studio.client.get(f"{RUN}/exports/{name}").status_code in (404, 414), name
         assert studio.client.delete(f"{RUN}/exports/{name}").status_code in (404, 405, 414), name
-    assert studio.client.get("/api/exports/none").status_code == 404
+    studio.get("/api/exports/none", code=404)
 
 
 def test_a_run_without_frames_has_nothing_to_export(studio: Studio, tracked: StoredRun) -> None:
-    made = studio.client.post("/api/sessions/take1/runs", json={"name": "fresh"})
-    assert made.status_code == 201, made.text
-    answer = studio.client.post("/api/sessions/take1/runs/fresh/exports", json={"format": "csv"})
-    response = studio.ended(f"/api/exports/{answer.json()['identifier']}")
+    studio.post("/api/sessions/take1/runs", {"name": "fresh"}, code=201)
+    answer = studio.post("/api/sessions/take1/runs/fresh/exports", {"format": "csv"})
+    response = studio.ended(f"/api/exports/{answer['identifier']}")
     assert response["state"] == "failed"
     assert "it has none" in response["message"]
 
@@ -130,10 +127,10 @@ def test_an_export_can_be_cancelled(
             time.sleep(0.01)
 
     monkeypatch.setattr("studio.results.export.exporting.plugged_in", lambda name: endless)
-    begun = studio.client.post(f"{RUN}/exports", json={"format": "viser"}).json()
-    listed = studio.client.get(f"{RUN}/exports").json()
+    begun = studio.post(f"{RUN}/exports", {"format": "viser"})
+    listed = studio.get(f"{RUN}/exports")
     assert [entry["identifier"] for entry in listed["running"]] == [begun["identifier"]]
-    assert studio.client.delete(f"/api/exports/{begun['identifier']}").status_code == 202
+    studio.delete(f"/api/exports/{begun['identifier']}", code=202)
     assert studio.ended(f"/api/exports/{begun['identifier']}")["state"] == "cancelled"
     assert list((tracked.folder / "exports").iterdir()) == []
 

@@ -10,12 +10,10 @@ from studio.sessions.session import Session
 def test_a_run_without_frames_makes_no_film(studio: Studio, session: Session) -> None:
     run = prepare_run(session, name="bare")
     studio.scenes.plain.shown = Selection(session=session.name, run=run.name)
-    answer = studio.client.post("/api/scene/films", json={"of": "frames"})
-    assert answer.status_code == 404
-    assert "no frames" in answer.json()["message"]
+    answer = studio.post("/api/scene/films", {"of": "frames"}, code=404)
+    assert "no frames" in answer["message"]
 
 
 def test_a_scene_that_shows_no_run_makes_no_film(studio: Studio) -> None:
-    answer = studio.client.post("/api/scene/films", json={"of": "layers"})
-    assert answer.status_code == 404
-    assert "Open a run" in answer.json()["hint"]
+    answer = studio.post("/api/scene/films", {"of": "layers"}, code=404)
+    assert "Open a run" in answer["hint"]

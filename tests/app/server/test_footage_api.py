@@ -25,7 +25,7 @@ FOUND = Synchrony(
 
 
 def test_the_footage_as_it_is(studio: Studio) -> None:
-    response = studio.client.get(HERE).json()
+    response = studio.get(HERE)
     assert (response["frame_count"], response["fps"], response["stale_runs"]) == (4, 25.0, [])
     assert response["layout"] == "folder in the studio's layout"
     assert [(camera["name"], camera["offset"], camera["turned"]) for camera in response["cameras"]] == [
@@ -35,23 +35,22 @@ def test_the_footage_as_it_is(studio: Studio) -> None:
 
 
 def test_a_change_is_written_and_says_what_it_makes_stale(studio: Studio, tracked: StoredRun) -> None:
-    picture = studio.client.get("/api/sessions/take1/thumbnail.jpg")
-    assert picture.status_code == 200
-    response = studio.client.patch(HERE, json={"offsets": {"cam2": 1}, "rotations": {"cam1": 180}}).json()
+    studio.get("/api/sessions/take1/thumbnail.jpg")
+    response = studio.patch(HERE, {"offsets": {"cam2": 1}, "rotations": {"cam1": 180}})
     assert [(camera["offset"], camera["turned"]) for camera in response["cameras"]] == [(0, 180), (1, 0)]
     assert response["frame_count"] == 3
     assert response["stale_runs"] == ["first"]
     assert any("Run first was tracked before this change" in note for note in response["notes"])
     assert any("start pose" in note for note in response["notes"])
     # The run keeps its numbers.
-    assert studio.client.get("/api/sessions/take1/runs/first").status_code == 200
+    studio.get("/api/sessions/take1/runs/first")
     assert tracked.record.last == 4
-    again = studio.client.get(HERE).json()
+    again = studio.get(HERE)
     assert again["stale_runs"] == ["first"]
     footage = Session(tracked.folder.parent.parent).footage()
     other = cv2.imread(str(Path(footage.folder) / "pictures" / "cam1" / "0002.png"))
     np.testing.assert_array_equal(footage.picture("cam1", 2), cv2.rotate(other, cv2.ROTATE_180))
-    nothing = studio.client.patch(HERE, json={"offsets": {"cam2": 1}}).json()
+    nothing = studio.patch(HERE, {"offsets": {"cam2": 1}})
     assert nothing["notes"] == ["Nothing changes."]
 
 
@@ -68,12 +67,12 @@ def test_what_cannot_be_changed(studio: Studio, sent: dict, said: str) -> None:
     assert 400 <= answer.status_code < 500
     assert said in answer.json()["message"]
     assert answer.json()["hint"]
-    assert [camera["offset"] for camera in studio.client.get(HERE).json()["cameras"]] == [0, 0]
+    assert [camera["offset"] for camera in studio.get(HERE)["cameras"]] == [0, 0]
 
 
 def test_requests_that_make_no_sense(studio: Studio) -> None:
     for request in ({"rotations": {"cam1": 45}}, {"offsets": {"cam1": "x"}}, {"speed": 3}):
-        assert studio.client.patch(HERE, json=request).status_code == 422
+        studio.patch(HERE, request, code=422)
 
 
 def test_an_estimate_is_shown_and_not_applied(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,8 +85,8 @@ def test_an_estimate_is_shown_and_not_applied(studio: Studio, monkeypatch: pytes
         return FOUND
 
     monkeypatch.setattr(footage, "synchrony_of", estimate)
-    assert studio.client.get(SYNCHRONY).json() is None
-    assert studio.client.post(SYNCHRONY, json={"within": 2.0}).status_code == 202
+    assert studio.get(SYNCHRONY) is None
+    studio.post(SYNCHRONY, {"within": 2.0}, code=202)
     response = studio.ended(SYNCHRONY)
     assert (response["state"], response["offsets"], response["sure"]) == (
         "done",
@@ -98,11 +97,11 @@ def test_an_estimate_is_shown_and_not_applied(studio: Studio, monkeypatch: pytes
     assert response["spread"] == {"cam1": 1, "cam2": 1}
     assert response["pairs"][0]["lag"] == 3
     assert asked == [2.0]
-    assert [camera["offset"] for camera in studio.client.get(HERE).json()["cameras"]] == [0, 0]
+    assert [camera["offset"] for camera in studio.get(HERE)["cameras"]] == [0, 0]
 
 
 def test_a_real_estimate_of_too_few_frames_says_why(studio: Studio) -> None:
-    studio.client.post(SYNCHRONY)
+    studio.post(SYNCHRONY)
     response = studio.ended(SYNCHRONY)
     assert response["state"] == "failed"
     assert "Camera cam1 has 4 frames" in response["message"]
@@ -120,9 +119,9 @@ def test_an_estimate_can_be_stopped(studio: Studio, monkeypatch: pytest.MonkeyPa
         raise FootageError("not stopped", "")
 
     monkeypatch.setattr(footage, "synchrony_of", estimate)
-    studio.client.post(SYNCHRONY)
+    studio.post(SYNCHRONY)
     assert begun.wait(PATIENCE)
-    studio.client.delete(SYNCHRONY)
+    studio.delete(SYNCHRONY)
     stopped.set()
     response = studio.ended(SYNCHRONY)
     assert (response["state"], response["code"]) == ("cancelled", "cancelled")
@@ -137,15 +136,15 @@ def test_an_import_puts_cameras_in_step_and_says_whose_layout_it_was(studio: Stu
         "rotations": {"cam1": 180},
         "unit": "mm",
     }
-    identifier = studio.client.post("/api/imports", json=request).json()["identifier"]
+    identifier = studio.post("/api/imports", request)["identifier"]
     deadline = time.monotonic() + PATIENCE
     state = {"state": "running"}
     while state["state"] in ("queued", "running", "cancelling") and time.monotonic() < deadline:
-        state = studio.client.get(f"/api/imports/{identifier}").json()
+        state = studio.get(f"/api/imports/{identifier}")
     assert state["state"] == "done", state
     assert state["layout"] == "folder in the studio's layout"
-    response = studio.client.get("/api/sessions/stepped/footage").json()
+    response = studio.get("/api/sessions/stepped/footage")
     assert [(camera["offset"], camera["turned"]) for camera in response["cameras"]] == [(0, 180), (1, 0)]
     assert response["frame_count"] == 3
     for bad in ({"trial": 3}, {"rotations": {"cam1": 30}}, {"unit": "inch"}, {"up": "w"}):
-        assert studio.client.post("/api/imports", json={**request, "name": "other", **bad}).status_code == 422
+        studio.post("/api/imports", {**request, "name": "other", **bad}, code=422)

@@ -62,7 +62,7 @@ class HeldFit:
 @pytest.fixture
 def held(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> Iterator[HeldFit]:
     """The session has a subject by height; fits are held."""
-    assert studio.client.put("/api/sessions/take1/subject", json={"height_mm": 1800}).is_success
+    studio.put("/api/sessions/take1/subject", {"height_mm": 1800})
     fit = HeldFit()
     monkeypatch.setattr(person, "fit_session_subject", fit)
     yield fit
@@ -232,12 +232,11 @@ def test_a_run_s_refinement_is_found_again_and_shown_where_it_was_begun(
 def test_refining_is_cancelled_from_another_window(
     context: BrowserContext, studio: Studio, refining: threading.Event
 ) -> None:
-    begun = studio.client.post("/api/sessions/take1/runs/first/refine", json={})
-    assert begun.status_code == 202
+    begun = studio.post("/api/sessions/take1/runs/first/refine", {}, code=202)
     page = opened(context, studio, "/?session=take1&run=first")
     page.locator("#track-work").get_by_role("button", name="Cancel").click()
     expect(page.locator("#track-work")).to_be_empty()
-    state = studio.client.get(f"/api/track-jobs/{begun.json()['identifier']}").json()
+    state = studio.get(f"/api/track-jobs/{begun['identifier']}")
     assert state["state"] == "cancelled"
 
 

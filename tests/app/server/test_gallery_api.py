@@ -18,11 +18,11 @@ SHORT = Card("stand", "Standing", "Almost still.")
 
 
 def card(studio: Studio, name: str) -> dict:
-    return next(one for one in studio.client.get("/api/gallery").json()["cards"] if one["name"] == name)
+    return next(one for one in studio.get("/api/gallery")["cards"] if one["name"] == name)
 
 
 def test_every_card_can_be_opened_made_or_tells_where_its_footage_is(studio: Studio) -> None:
-    names = [one["name"] for one in studio.client.get("/api/gallery").json()["cards"]]
+    names = [one["name"] for one in studio.get("/api/gallery")["cards"]]
     assert names == [one.name for one in CARDS]
     assert len(set(names)) == len(names)
     assert {"walk", "planar_arm", "branched_arms", "mouse", "balance"} <= set(names)
@@ -40,11 +40,11 @@ def test_every_card_can_be_opened_made_or_tells_where_its_footage_is(studio: Stu
 def test_a_bundled_session_is_opened_and_stays(studio: Studio) -> None:
     assert studio.client.get("/api/gallery/planar_arm/picture.jpg").headers["content-type"] == "image/jpeg"
     assert card(studio, "planar_arm")["there"] is False
-    assert studio.client.post("/api/gallery/planar_arm").status_code == 202
+    studio.post("/api/gallery/planar_arm", code=202)
     assert studio.ended("/api/gallery/planar_arm")["state"] == "done"
     assert card(studio, "planar_arm")["there"] is True
-    assert studio.client.get("/api/sessions/planar_arm").status_code == 200
-    studio.client.post("/api/gallery/planar_arm")
+    studio.get("/api/sessions/planar_arm")
+    studio.post("/api/gallery/planar_arm")
     assert studio.ended("/api/gallery/planar_arm")["state"] == "done"
 
 
@@ -75,15 +75,15 @@ def test_a_recipe_is_rendered_as_a_job(
 ) -> None:
     real = gallery.synthesize
     monkeypatch.setattr(gallery, "synthesize", lambda recipe, into, report, _: real(recipe, into, report, 2))
-    assert studio.client.post("/api/gallery/stand").status_code == 202
+    studio.post("/api/gallery/stand", code=202)
     assert studio.ended("/api/gallery/stand")["state"] == "done"
-    assert studio.client.get("/api/sessions/stand").json()["frame_count"] == 2
+    assert studio.get("/api/sessions/stand")["frame_count"] == 2
 
 
 def test_rendering_that_is_cancelled_leaves_nothing(studio: Studio, standing: None) -> None:
-    studio.client.post("/api/gallery/stand")
-    until(lambda: studio.client.get("/api/gallery/stand").json()["done"] > 0, 120.0)
-    assert studio.client.delete("/api/gallery/stand").status_code == 202
+    studio.post("/api/gallery/stand")
+    until(lambda: studio.get("/api/gallery/stand")["done"] > 0, 120.0)
+    studio.delete("/api/gallery/stand", code=202)
     assert studio.ended("/api/gallery/stand")["state"] == "cancelled"
     assert not (studio.workspace.root / "stand").exists()
 
@@ -97,29 +97,29 @@ def test_footage_that_is_not_shipped_is_imported_where_there_is_a_copy(
     videos.mkdir(parents=True)
     (videos / "back.mp4").write_bytes(b"no video")
     assert card(studio, "mouse")["missing"] == ""
-    studio.client.post("/api/gallery/mouse")
+    studio.post("/api/gallery/mouse")
     assert studio.ended("/api/gallery/mouse")["state"] == "failed"
     assert not (studio.workspace.root / "mouse").exists(), "what failed leaves nothing"
     for name in ("back", "top"):
         with ClipWriter(videos / f"{name}.mp4", (64, 48), 30.0, 12) as clip:
             for level in range(4):
                 clip.add(np.full((48, 64, 3), 40 * level, np.uint8))
-    studio.client.post("/api/gallery/mouse")
+    studio.post("/api/gallery/mouse")
     assert studio.ended("/api/gallery/mouse")["state"] == "done"
     assert card(studio, "mouse")["there"] is True
-    assert studio.client.get("/api/sessions/mouse").json()["frame_count"] == 4
+    assert studio.get("/api/sessions/mouse")["frame_count"] == 4
 
 
 def test_what_cannot_be_made_says_why(
     studio: Studio, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("STUDIO_REAL_DATA", str(tmp_path / "nowhere"))
-    studio.client.post("/api/gallery/mouse")
+    studio.post("/api/gallery/mouse")
     state = studio.ended("/api/gallery/mouse")
     assert state["state"] == "failed"
     assert "sleap-anipose" in state["hint"]
-    assert studio.client.post("/api/gallery/nothing").status_code == 404
-    assert studio.client.get("/api/gallery/mouse/picture.jpg").status_code == 404
+    studio.post("/api/gallery/nothing", code=404)
+    studio.get("/api/gallery/mouse/picture.jpg", code=404)
     assert "STUDIO_REAL_DATA" in card(studio, "dance")["missing"]
     assert card(studio, "handstand")["missing"] == ""
 

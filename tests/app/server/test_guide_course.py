@@ -100,11 +100,11 @@ def test_runs_are_made_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
 
 
 def test_the_page_asks_whether_they_are_there(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = studio.client.get("/api/course").json()
+    found = studio.get("/api/course")
     assert [run["name"] for run in found["runs"]] == [BEGINNING_RUN, *(run.name for run in RUNS)]
     assert not any(run["there"] for run in found["runs"])
     assert found["job"] is None
-    assert studio.client.delete("/api/course").status_code == 404
+    studio.delete("/api/course", code=404)
 
 
 @pytest.mark.slow

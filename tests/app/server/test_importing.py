@@ -15,19 +15,8 @@ from studio.operations import footage
 
 def imported(studio: Studio, **request: object) -> dict:
     """Begin an import and wait for its end."""
-    answer = studio.client.post("/api/imports", json=request)
-    assert answer.status_code == 202, answer.text
-    return studio.ended(f"/api/imports/{answer.json()['identifier']}")
-
-
-def uploaded(studio: Studio, files: dict[str, bytes]) -> str:
-    """An upload with these files."""
-    identifier = studio.client.post("/api/uploads", json={}).json()["identifier"]
-    for path, content in files.items():
-        answer = studio.client.put(f"/api/uploads/{identifier}/files", params={"path": path}, content=content)
-        assert answer.status_code == 200, answer.text
-        assert answer.json()["received"] == len(content)
-    return identifier
+    answer = studio.post("/api/imports", request, code=202)
+    return studio.ended(f"/api/imports/{answer['identifier']}")
 
 
 def files_of(source: Path, prefix: str = "") -> dict[str, bytes]:
@@ -44,7 +33,7 @@ def test_a_folder_of_this_machine_is_imported(studio: Studio, source: Path) -> N
     assert response["state"] == "done", response
     assert {match["camera"] for match in response["matching"]} == {"cam1", "cam2"}
     assert studio.workspace.session("second").manifest.fps == 30.0
-    names = [entry["name"] for entry in studio.client.get("/api/sessions").json()["sessions"]]
+    names = [entry["name"] for entry in studio.get("/api/sessions")["sessions"]]
     assert names == ["second", "take1"]
 
 
@@ -80,14 +69,14 @@ def test_names_taken_and_places_forbidden_are_refused_at_once(studio: Studio, so
 def test_an_uploaded_folder_is_imported_and_the_upload_removed(
     studio: Studio, source: Path, prefix: str
 ) -> None:
-    identifier = uploaded(studio, files_of(source, prefix) | {f"{prefix}.DS_Store": b"x"})
+    identifier = studio.upload(files_of(source, prefix) | {f"{prefix}.DS_Store": b"x"})
     response = imported(studio, name="sent", upload=identifier, fps=25)
     assert response["state"] == "done", response
     sent = studio.workspace.session("sent")
     with_pictures = sent.footage()
     assert with_pictures.frame_count == 4
     with_pictures.close()
-    assert studio.client.get(f"/api/uploads/{identifier}").status_code == 404
+    studio.get(f"/api/uploads/{identifier}", code=404)
 
 
 def test_an_uploaded_zip_is_unpacked(studio: Studio, source: Path) -> None:
@@ -95,48 +84,44 @@ def test_an_uploaded_zip_is_unpacked(studio: Studio, source: Path) -> None:
     with zipfile.ZipFile(stream, "w") as archive:
         for name, content in files_of(source, "take/").items():
             archive.writestr(name, content)
-    response = imported(
-        studio, name="zipped", upload=uploaded(studio, {"take.zip": stream.getvalue()}), fps=25
-    )
+    response = imported(studio, name="zipped", upload=studio.upload({"take.zip": stream.getvalue()}), fps=25)
     assert response["state"] == "done", response
 
 
 def test_a_bad_zip_is_refused_in_words(studio: Studio) -> None:
-    response = imported(studio, name="zipped", upload=uploaded(studio, {"take.zip": b"PK no zip"}), fps=25)
+    response = imported(studio, name="zipped", upload=studio.upload({"take.zip": b"PK no zip"}), fps=25)
     assert response["state"] == "failed"
     assert response["code"] == "archive"
 
 
 def test_a_broken_upload_goes_on_where_it_stopped(studio: Studio) -> None:
-    identifier = uploaded(studio, {"a.bin": b"0123"})
+    identifier = studio.upload({"a.bin": b"0123"})
     place = f"/api/uploads/{identifier}/files"
-    answer = studio.client.put(place, params={"path": "a.bin", "offset": 4}, content=b"4567")
-    assert answer.json() == {"path": "a.bin", "received": 8, "total": 8}
-    gap = studio.client.put(place, params={"path": "a.bin", "offset": 99}, content=b"x")
-    assert gap.status_code == 409
-    assert "8 bytes" in gap.json()["message"]
-    state = studio.client.get(f"/api/uploads/{identifier}").json()
+    answer = studio.put(place, params={"path": "a.bin", "offset": 4}, content=b"4567")
+    assert answer == {"path": "a.bin", "received": 8, "total": 8}
+    gap = studio.put(place, params={"path": "a.bin", "offset": 99}, content=b"x", code=409)
+    assert "8 bytes" in gap["message"]
+    state = studio.get(f"/api/uploads/{identifier}")
     assert state["files"] == {"a.bin": 8}
-    again = studio.client.put(place, params={"path": "a.bin"}, content=b"new")
-    assert again.json()["total"] == 3
+    again = studio.put(place, params={"path": "a.bin"}, content=b"new")
+    assert again["total"] == 3
     file = studio.workspace.root / ".studio" / "uploads" / identifier / "a.bin"
     assert file.read_bytes() == b"new"
-    assert studio.client.delete(f"/api/uploads/{identifier}").status_code == 204
+    studio.delete(f"/api/uploads/{identifier}", code=204)
     assert not file.exists()
 
 
 @pytest.mark.parametrize("path", ["../a", "/a", "a\\b", "a\0", "con", "", "x" * 1200])
 def test_uploads_stay_in_their_folder(studio: Studio, path: str) -> None:
-    identifier = studio.client.post("/api/uploads").json()["identifier"]
-    answer = studio.client.put(f"/api/uploads/{identifier}/files", params={"path": path}, content=b"x")
-    assert answer.status_code == 422
-    assert answer.json()["code"] == "path"
+    identifier = studio.post("/api/uploads")["identifier"]
+    answer = studio.put(f"/api/uploads/{identifier}/files", params={"path": path}, content=b"x", code=422)
+    assert answer["code"] == "path"
 
 
 def test_the_server_counts_what_arrives(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit holds for a body without a Content-Length, and over all files of an upload."""
     monkeypatch.setattr(upload_routes, "LIMIT", 1000)
-    identifier = uploaded(studio, {"first.bin": bytes(600)})
+    identifier = studio.upload({"first.bin": bytes(600)})
 
     def endless():
         while True:
@@ -155,9 +140,8 @@ def test_the_server_counts_what_arrives(studio: Studio, monkeypatch: pytest.Monk
 
 def test_json_bodies_have_a_limit_too(studio: Studio) -> None:
     big = b'{"name": "' + b"x" * body_limit.JSON_LIMIT + b'"}'
-    answer = studio.client.post("/api/imports", content=big)
-    assert answer.status_code == 413
-    assert answer.json()["code"] == "too-large"
+    answer = studio.post("/api/imports", content=big, code=413)
+    assert answer["code"] == "too-large"
     headers = {"cookie": cookie_header(studio.client), "origin": studio.base}
 
     def pieces():
@@ -169,14 +153,14 @@ def test_json_bodies_have_a_limit_too(studio: Studio) -> None:
 
 
 def test_folders_can_be_looked_through_only_under_the_roots(studio: Studio, source: Path) -> None:
-    roots = studio.client.get("/api/folders").json()["folders"]
+    roots = studio.get("/api/folders")["folders"]
     assert roots == [str(source.parent.resolve())]
-    inside = studio.client.get("/api/folders", params={"path": str(source)}).json()
+    inside = studio.get("/api/folders", params={"path": str(source)})
     assert inside["folders"] == ["calibration", "pictures"]
     assert inside["parent"] == roots[0]
-    assert studio.client.get("/api/folders", params={"path": roots[0]}).json()["parent"] == ""
+    assert studio.get("/api/folders", params={"path": roots[0]})["parent"] == ""
     for path in ("/", "/etc", f"{source}/../../..", "relative"):
-        assert studio.client.get("/api/folders", params={"path": path}).status_code == 422
+        studio.get("/api/folders", params={"path": path}, code=422)
 
 
 def test_an_import_can_be_cancelled(studio: Studio, source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -187,10 +171,8 @@ def test_an_import_can_be_cancelled(studio: Studio, source: Path, monkeypatch: p
             progress("reading", 1, 2)
 
     monkeypatch.setattr(footage, "import_source", slowly)
-    identifier = studio.client.post("/api/imports", json={"name": "x", "source": str(source)}).json()[
-        "identifier"
-    ]
-    assert studio.client.delete(f"/api/imports/{identifier}").status_code == 202
+    identifier = studio.post("/api/imports", {"name": "x", "source": str(source)})["identifier"]
+    studio.delete(f"/api/imports/{identifier}", code=202)
     response = studio.ended(f"/api/imports/{identifier}")
     assert response["state"] == "cancelled"
     assert "cancelled" in response["message"]

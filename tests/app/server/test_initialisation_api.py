@@ -57,9 +57,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
 
 def test_what_is_found_is_reported_kept_and_shown(studio: Studio, session: Session, quick: dict) -> None:
     before = (session.path / "start_pose.csv").read_text()
-    answer = studio.client.post("/api/sessions/take1/initialise", json={"frame": 2, "seed": 5})
-    assert answer.status_code == 202, answer.text
-    response = studio.ended(f"/api/initialisations/{answer.json()['identifier']}")
+    answer = studio.post("/api/sessions/take1/initialise", {"frame": 2, "seed": 5}, code=202)
+    response = studio.ended(f"/api/initialisations/{answer['identifier']}")
     assert response["state"] == "done", response
     assert (quick["frame"], quick["seed"]) == (2, 5)
     neutral = session.body().neutral
@@ -82,7 +81,7 @@ def test_replacing_keeps_the_old_pose_beside_the_new_one(
     studio: Studio, session: Session, quick: dict
 ) -> None:
     before = (session.path / "start_pose.csv").read_text()
-    response = studio.client.post("/api/sessions/take1/initialise", json={"replace": True}).json()
+    response = studio.post("/api/sessions/take1/initialise", {"replace": True})
     assert studio.ended(f"/api/initialisations/{response['identifier']}")["file"] == "start_pose.csv"
     stored = session.start_pose()
     assert stored is not None
@@ -100,8 +99,7 @@ def test_replacing_keeps_the_old_pose_beside_the_new_one(
     ],
 )
 def test_refusals(studio: Studio, quick: dict, sent: dict, status: int) -> None:
-    answer = studio.client.post("/api/sessions/take1/initialise", json=sent)
-    assert answer.status_code == status, answer.text
+    studio.post("/api/sessions/take1/initialise", sent, code=status)
     assert not quick
 
 
@@ -110,7 +108,7 @@ def test_failure_is_reported_in_words(studio: Studio, monkeypatch: pytest.Monkey
         raise RunError("Nothing is to be seen.", "Choose another frame.")
 
     monkeypatch.setattr(person, "initialise_session", fails)
-    response = studio.client.post("/api/sessions/take1/initialise", json={}).json()
+    response = studio.post("/api/sessions/take1/initialise", {})
     response = studio.ended(f"/api/initialisations/{response['identifier']}")
     assert (response["state"], response["message"], response["hint"]) == (
         "failed", "Nothing is to be seen.", "Choose another frame.",
@@ -128,8 +126,8 @@ def test_a_search_can_be_cancelled(studio: Studio, monkeypatch: pytest.MonkeyPat
         raise AssertionError("it was not stopped")
 
     monkeypatch.setattr(person, "initialise_session", waits)
-    identifier = studio.client.post("/api/sessions/take1/initialise", json={}).json()["identifier"]
+    identifier = studio.post("/api/sessions/take1/initialise", {})["identifier"]
     assert begun.wait(PATIENCE)
-    assert studio.client.delete(f"/api/initialisations/{identifier}").status_code == 202
+    studio.delete(f"/api/initialisations/{identifier}", code=202)
     assert studio.ended(f"/api/initialisations/{identifier}")["code"] == "cancelled"
-    assert studio.client.get("/api/initialisations/none").status_code == 404
+    studio.get("/api/initialisations/none", code=404)

@@ -17,12 +17,11 @@ LIVE = "/api/sessions/take1/runs/now/live"
 
 def test_a_live_run_is_made_and_says_how_it_went(studio: Studio, session: Session) -> None:
     request = {"name": "now", "live": True, "ping_pong": True, "last": 50}
-    line = studio.client.post("/api/sessions/take1/runs", json=request)
-    assert line.status_code == 201, line.text
-    assert studio.client.get("/api/sessions/take1/runs/now").json()["live"] is True
+    studio.post("/api/sessions/take1/runs", request, code=201)
+    assert studio.get("/api/sessions/take1/runs/now")["live"] is True
     run = session.run("now")
     assert run.record.ping_pong
-    assert studio.client.get(LIVE).json()["tracked"] == 0
+    assert studio.get(LIVE)["tracked"] == 0
     pose = run.body().neutral
     with ResultsWriter(run.folder) as writer:
         for frame, ready in ((0, 0.02), (3, 0.15)):
@@ -30,7 +29,7 @@ def test_a_live_run_is_made_and_says_how_it_went(studio: Studio, session: Sessio
                 frame, Estimate(pose, pose, pose, -1.0), 1, 10, 1, 5.0, FilterState(None, pose)
             )
             writer.write_frame(result, [], came=(0.04 * frame, ready))
-    response = studio.client.get(LIVE).json()
+    response = studio.get(LIVE)
     assert response["tracked"] == 2
     assert response["dropped"] == [1, 2]
     assert response["dropped_share"] == 0.5
@@ -40,12 +39,10 @@ def test_a_live_run_is_made_and_says_how_it_went(studio: Studio, session: Sessio
 
 
 def test_other_runs_have_no_live_figures(studio: Studio) -> None:
-    studio.client.post("/api/sessions/take1/runs", json={"name": "plain"})
-    answer = studio.client.get("/api/sessions/take1/runs/plain/live")
-    assert answer.status_code == 404
-    assert "not tracked live" in answer.json()["message"]
-    refused = studio.client.post("/api/sessions/take1/runs", json={"ping_pong": True})
-    assert refused.status_code == 409
+    studio.post("/api/sessions/take1/runs", {"name": "plain"})
+    answer = studio.get("/api/sessions/take1/runs/plain/live", code=404)
+    assert "not tracked live" in answer["message"]
+    studio.post("/api/sessions/take1/runs", {"ping_pong": True}, code=409)
 
 
 def test_the_state_event_says_how_it_keeps_up() -> None:
@@ -64,10 +61,10 @@ def test_the_state_event_says_how_it_keeps_up() -> None:
 
 def test_frames_behind_the_footages_end_have_pictures(studio: Studio) -> None:
     request = {"name": "now", "live": True, "ping_pong": True, "last": 50}
-    studio.client.post("/api/sessions/take1/runs", json=request)
+    studio.post("/api/sessions/take1/runs", request)
     place = "/api/sessions/take1/runs/now/frames/{}/views/cam1.jpg?show="
     inside, behind = (studio.client.get(place.format(frame)) for frame in (2, 4))
     assert inside.status_code == behind.status_code == 200
     assert inside.content == behind.content, "4 is 2 on the way back of four frames"
-    assert studio.client.get(place.format(50)).status_code == 404
-    assert studio.client.get("/api/sessions/take1/frames/4/views/cam1.jpg").status_code == 404
+    studio.get(place.format(50), code=404)
+    studio.get("/api/sessions/take1/frames/4/views/cam1.jpg", code=404)

@@ -47,7 +47,7 @@ def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
     named = re.findall(r'(?:href|src)="(/assets/[^"]+)"', page.text)
     assert named
     for address in named:
-        assert studio.client.get(address).status_code == 200, address
+        studio.get(address)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_every_page_is_put_together_whole(studio: Studio, address: str, title: s
     assert [to for to, _ in places] == list(PLACES)
     assert [to for to, mark in places if mark] == [address]
     for asset in re.findall(r'(?:href|src)="(/assets/[^"]+)"', text):
-        assert studio.client.get(asset).status_code == 200, asset
+        studio.get(asset)
 
 
 @pytest.mark.browser
@@ -111,8 +111,7 @@ def test_modules_have_the_type_that_browsers_want_and_are_requested_anew(studio:
     module = studio.client.get("/assets/js/main.js")
     assert module.headers["content-type"].startswith("text/javascript")
     assert module.headers["cache-control"] == "no-cache"
-    again = studio.client.get("/assets/js/main.js", headers={"if-none-match": module.headers["etag"]})
-    assert again.status_code == 304
+    studio.get("/assets/js/main.js", headers={"if-none-match": module.headers["etag"]}, code=304)
 
 
 def test_the_guide_carries_what_experiments_found_before_and_after(studio: Studio) -> None:
@@ -141,7 +140,7 @@ def test_the_guide_carries_what_experiments_found_before_and_after(studio: Studi
         # A row that changed says why.
         firm = "" if document["firm"] else " (not firm)"
         assert why or name not in before or before[name]["verdict"] == document["verdict"] + firm, name
-        assert studio.client.get(f"/assets/guide/reproduction/{name}.json").json()["name"] == name
+        assert studio.get(f"/assets/guide/reproduction/{name}.json")["name"] == name
 
 
 def test_the_guide_says_what_is_printed_what_is_run_and_why(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +193,7 @@ def test_every_page_that_the_guide_refers_to_is_there(studio: Studio) -> None:
         *(f"/guide/{name}" for name in GUIDE_PAGES),
         *(f"/guide/{name}" for name in COURSE),
     }
-    assert studio.client.get("/guide/nothing").status_code == 404
+    studio.get("/guide/nothing", code=404)
 
 
 def test_the_guide_links_to_the_page_of_python_examples(studio: Studio) -> None:
@@ -250,31 +249,31 @@ def test_preferences_are_remembered(studio: Studio) -> None:
 def test_the_scene_is_reported_what_to_show(
     studio: Studio, tracked: StoredRun, path: str, wish: dict[str, object], calls: list[tuple]
 ) -> None:
-    assert studio.client.post(f"/api/scene/{path}", json=wish).status_code == 204
+    studio.post(f"/api/scene/{path}", wish, code=204)
     assert studio.stage.calls == calls
 
 
 def test_layers_are_played_as_asked_and_what_is_left_out_stays(studio: Studio) -> None:
     path = "/api/scene/play-layers"
-    assert studio.client.get(path).json() == {"playing": False, "rate": 3.0, "mode": "loop"}
-    assert studio.client.post(path, json={"playing": True, "rate": 10}).status_code == 204
-    assert studio.client.post(path, json={"mode": "pingpong"}).status_code == 204
+    assert studio.get(path) == {"playing": False, "rate": 3.0, "mode": "loop"}
+    studio.post(path, {"playing": True, "rate": 10}, code=204)
+    studio.post(path, {"mode": "pingpong"}, code=204)
     assert studio.stage.calls == [("play layers", True, 10.0, None), ("play layers", None, None, "pingpong")]
     for wrong in ({"rate": 0.5}, {"rate": 11}, {"mode": "random"}, {"speed": 1}):
-        assert studio.client.post(path, json=wrong).status_code == 422
+        studio.post(path, wrong, code=422)
 
 
 def test_the_scene_is_not_reported_of_what_does_not_exist(studio: Studio, tracked: StoredRun) -> None:
     for wish in ({"session": "none"}, {"session": "take1", "run": "none"}):
-        assert studio.client.post("/api/scene/show", json=wish).status_code == 404
+        studio.post("/api/scene/show", wish, code=404)
     for wish in ({"session": "../x"}, {"frame": -1}, {"layer": "x"}, {"unknown": 1}):
-        assert studio.client.post("/api/scene/show", json=wish).status_code == 422
+        studio.post("/api/scene/show", wish, code=422)
     assert studio.stage.calls == []
     assert Selection().session == ""
 
 
 def test_the_api_describes_itself(studio: Studio) -> None:
-    spec = studio.client.get("/api/openapi.json").json()
+    spec = studio.get("/api/openapi.json")
     assert spec["info"]["title"] == "Capture studio"
     for path, methods in spec["paths"].items():
         for method, operation in methods.items():

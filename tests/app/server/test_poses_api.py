@@ -28,51 +28,46 @@ def toy(workspace: Workspace) -> Session:
 
 def test_a_start_pose_is_kept_and_the_old_one_stays_beside_it(studio: Studio, toy: Session) -> None:
     path = f"{TOY}/start-pose"
-    before = studio.client.get(path).json()
+    before = studio.get(path)
     assert before["body"] == ARM.name
     assert [grip["name"] for grip in before["grips"]] == [limb.name for limb in ARM.drawn]
     assert not before["has_sides"]
-    put = studio.client.put(path, json={"pose": POSE})
-    assert put.status_code == 200
-    assert studio.client.get(path).json()["stored"]
-    assert studio.client.get(path).json()["pose"] == pytest.approx(POSE)
-    studio.client.put(path, json={"pose": [0.0] * 4})
+    studio.put(path, {"pose": POSE})
+    assert studio.get(path)["stored"]
+    assert studio.get(path)["pose"] == pytest.approx(POSE)
+    studio.put(path, {"pose": [0.0] * 4})
     with (toy.path / "start_pose-before.csv").open() as file:
         rows = list(csv.reader(file))
     assert rows[0][0] == "frame"
     assert [float(value) for value in rows[-1][1:]] == pytest.approx(POSE)
-    assert studio.client.put(path, json={"pose": POSE, "frame": 2}).json()["frame"] == 2
-    assert studio.client.get(TOY).json()["start_pose_frame"] == 2
+    assert studio.put(path, {"pose": POSE, "frame": 2})["frame"] == 2
+    assert studio.get(TOY)["start_pose_frame"] == 2
     made = studio.client.post(f"{TOY}/runs", json={"name": "later"})
     assert (made.status_code, made.json()["first"]) == (201, 2)
-    assert studio.client.put(path, json={"pose": POSE, "frame": 99}).status_code == 409
-    refused = studio.client.put(path, json={"pose": [0.0]})
-    assert refused.status_code == 422
-    assert "4 finite numbers" in refused.json()["message"]
+    studio.put(path, {"pose": POSE, "frame": 99}, code=409)
+    refused = studio.put(path, {"pose": [0.0]}, code=422)
+    assert "4 finite numbers" in refused["message"]
 
 
 def test_a_drag_brings_the_tip_to_its_target(studio: Studio, toy: Session) -> None:
     path = f"{TOY}/pose/drag"
     wanted = limb_ends(ARM, np.array([0.4, 0.2, -0.1, 0.3]))[0, -1, 1]
     request = {"pose": POSE, "limb": ARM.drawn[-1].name, "target": wanted.tolist()}
-    found = studio.client.post(path, json=request).json()
+    found = studio.post(path, request)
     assert found["left_mm"] < 1.0
     np.testing.assert_allclose(limb_ends(ARM, np.array(found["pose"]))[0, -1, 1], wanted, atol=1.0)
-    refused = studio.client.post(path, json=request | {"limb": "wing"})
-    assert refused.status_code == 422
-    assert "no limb 'wing'" in refused.json()["message"]
-    mirrored = studio.client.post(path.replace("drag", "mirror"), json={"pose": POSE})
-    assert mirrored.status_code == 422
-    assert "no left and right" in mirrored.json()["message"]
+    refused = studio.post(path, request | {"limb": "wing"}, code=422)
+    assert "no limb 'wing'" in refused["message"]
+    mirrored = studio.post(path.replace("drag", "mirror"), {"pose": POSE}, code=422)
+    assert "no left and right" in mirrored["message"]
 
 
 def test_the_search_around_a_pose_ends_nearer_to_the_truth(studio: Studio, toy: Session) -> None:
     truth = true_poses()[3]
     off = (truth + np.array([0.12, -0.1, 0.1, -0.08])).tolist()
     path = f"{TOY}/pose/refine"
-    begun = studio.client.post(path, json={"pose": off, "frame": 3})
-    assert begun.status_code == 202
-    state = studio.ended(f"/api/track-jobs/{begun.json()['identifier']}")
+    begun = studio.post(path, {"pose": off, "frame": 3}, code=202)
+    state = studio.ended(f"/api/track-jobs/{begun['identifier']}")
     assert state["state"] == "done", state
     assert state["verb"] == "pose"
     assert state["gain"] > 0.0
@@ -102,6 +97,6 @@ def test_pictures_carry_the_pose_that_is_requested(studio: Studio, toy: Session)
     bare, posed = studio.client.get(base), studio.client.get(f"{base}&pose={','.join(map(str, POSE))}")
     assert bare.status_code == posed.status_code == 200
     assert bare.content != posed.content
-    assert studio.client.get(f"{base}&pose=1,2").status_code == 422
-    studio.client.put(f"{TOY}/start-pose", json={"pose": POSE})
+    studio.get(f"{base}&pose=1,2", code=422)
+    studio.put(f"{TOY}/start-pose", {"pose": POSE})
     assert studio.client.get(f"{base}&pose=start").content == posed.content

@@ -34,7 +34,7 @@ def give_truth(session: Session, run: StoredRun, shift_mm: float) -> None:
 
 
 def test_the_timeline(studio: Studio, tracked: StoredRun) -> None:
-    response = studio.client.get(f"{RUN}/frames").json()
+    response = studio.get(f"{RUN}/frames")
     assert (response["first"], response["last"], response["fps"]) == (0, 4, 25.0)
     assert [entry["frame"] for entry in response["frames"]] == [0, 1]
     assert response["frames"][0]["log_weight"] == -1.5
@@ -47,22 +47,22 @@ def test_the_timeline(studio: Studio, tracked: StoredRun) -> None:
 
 def test_with_truth_every_frame_has_its_error(studio: Studio, session: Session, tracked: StoredRun) -> None:
     give_truth(session, tracked, 30.0)
-    response = studio.client.get(f"{RUN}/frames").json()
+    response = studio.get(f"{RUN}/frames")
     assert np.allclose([entry["error_mm"] for entry in response["frames"]], 30.0, atol=0.01)
     assert np.isclose(response["mean_mm"], 30.0, atol=0.01)
     assert np.isclose(response["worst_mm"], 30.0, atol=0.01)
     assert not any(entry["lost"] for entry in response["frames"])
-    measured = studio.client.get(f"{RUN}/evaluation").json()
+    measured = studio.get(f"{RUN}/evaluation")
     assert np.isclose(measured["mean_mm"], 30.0, atol=0.01)
     assert measured["lost_frames"] == 0
     assert measured["frames"] == [0, 1]
-    [line] = studio.client.get("/api/sessions/take1/runs").json()["runs"]
+    [line] = studio.get("/api/sessions/take1/runs")["runs"]
     assert np.isclose(line["mean_mm"], 30.0, atol=0.01)
 
 
 def test_lost_limbs_are_marked(studio: Studio, session: Session, tracked: StoredRun) -> None:
     give_truth(session, tracked, 200.0)
-    assert all(entry["lost"] for entry in studio.client.get(f"{RUN}/frames").json()["frames"])
+    assert all(entry["lost"] for entry in studio.get(f"{RUN}/frames")["frames"])
 
 
 def test_a_truth_that_cannot_be_used_is_named_and_spoils_nothing(
@@ -70,21 +70,20 @@ def test_a_truth_that_cannot_be_used_is_named_and_spoils_nothing(
 ) -> None:
     (session.path / "truth").mkdir()
     (session.path / "truth" / "bad.trc").write_text("nothing")
-    response = studio.client.get(f"{RUN}/frames").json()
+    response = studio.get(f"{RUN}/frames")
     assert "bad.trc" in response["truth_problem"]
     assert len(response["frames"]) == 2
-    assert studio.client.get("/api/sessions").json()["sessions"][0]["runs"][0]["mean_mm"] is None
-    assert studio.client.get(f"{RUN}/evaluation").status_code == 422
+    assert studio.get("/api/sessions")["sessions"][0]["runs"][0]["mean_mm"] is None
+    studio.get(f"{RUN}/evaluation", code=422)
 
 
 def test_without_truth_there_is_no_evaluation(studio: Studio, tracked: StoredRun) -> None:
-    answer = studio.client.get(f"{RUN}/evaluation")
-    assert answer.status_code == 404
-    assert "truth" in answer.json()["hint"]
+    answer = studio.get(f"{RUN}/evaluation", code=404)
+    assert "truth" in answer["hint"]
 
 
 def test_any_stored_frame_with_all_its_layers(studio: Studio, tracked: StoredRun) -> None:
-    response = studio.client.get(f"{RUN}/frames/1").json()
+    response = studio.get(f"{RUN}/frames/1")
     with tracked.results() as results:
         layers, result = results.layers(1), results.result(1)
     assert response["finished"] is True
@@ -97,14 +96,14 @@ def test_any_stored_frame_with_all_its_layers(studio: Studio, tracked: StoredRun
         assert shown["particles"] == len(stored.poses)
         assert shown["beta"] == stored.beta
     assert response["settings"]["survival"] == 0.77
-    assert studio.client.get(f"{RUN}/frames/0").json()["settings"] == tracked.record.settings
-    assert studio.client.get(f"{RUN}/frames/1/layers/2").json() == response["layers"][2]
+    assert studio.get(f"{RUN}/frames/0")["settings"] == tracked.record.settings
+    assert studio.get(f"{RUN}/frames/1/layers/2") == response["layers"][2]
 
 
 def test_particles_as_numbers_and_as_bytes(studio: Studio, tracked: StoredRun) -> None:
     with tracked.results() as results:
         stored = results.layer(0, 1)
-    response = studio.client.get(f"{RUN}/frames/0/layers/1/particles").json()
+    response = studio.get(f"{RUN}/frames/0/layers/1/particles")
     assert np.allclose(response["poses"], stored.poses)
     assert np.allclose(response["log_weights"], stored.log_weights)
     assert response["parameters"] == list(tracked.record.parameters)
@@ -113,8 +112,7 @@ def test_particles_as_numbers_and_as_bytes(studio: Studio, tracked: StoredRun) -
     table = np.frombuffer(answer.content, "<f4").reshape(shape)
     assert np.allclose(table[:, :-1], stored.poses, atol=1e-6)
     assert np.allclose(table[:, -1], stored.log_weights, atol=1e-6)
-    wrong = studio.client.get(f"{RUN}/frames/0/layers/1/particles", params={"format": "pickle"})
-    assert wrong.status_code == 422
+    studio.get(f"{RUN}/frames/0/layers/1/particles", params={"format": "pickle"}, code=422)
 
 
 def test_poses_as_csv_read_back_exactly(studio: Studio, tracked: StoredRun) -> None:
@@ -143,15 +141,14 @@ def test_variances_as_csv(studio: Studio, tracked: StoredRun) -> None:
     "path", ["frames/3", "frames/0/layers/9", "frames/9/variance.csv", "frames/0/layers/9/particles"]
 )
 def test_what_is_not_there_is_404_in_words(studio: Studio, tracked: StoredRun, path: str) -> None:
-    answer = studio.client.get(f"{RUN}/{path}")
-    assert answer.status_code == 404
-    assert answer.json()["hint"]
+    answer = studio.get(f"{RUN}/{path}", code=404)
+    assert answer["hint"]
 
 
 def test_the_frame_in_progress_shows_the_layers_that_are_done(studio: Studio, tracked: StoredRun) -> None:
-    from_store = studio.client.get(f"{RUN}/frames/0").json()["layers"]
+    from_store = studio.get(f"{RUN}/frames/0")["layers"]
     assert [layer["layer"] for layer in from_store] == [0, 1, 2]
-    assert studio.client.get(f"{RUN}/frames").json()["partial"] is None
+    assert studio.get(f"{RUN}/frames")["partial"] is None
 
 
 # ---------------------------------------------------------------- pictures
@@ -203,9 +200,8 @@ def test_overlays_change_the_picture_and_its_height(studio: Studio, tracked: Sto
     ],
 )
 def test_pictures_that_are_not_there(studio: Studio, tracked: StoredRun, path: str, status: int) -> None:
-    answer = studio.client.get(f"{RUN}/{path}")
-    assert answer.status_code == status
-    assert answer.json()["message"]
+    answer = studio.get(f"{RUN}/{path}", code=status)
+    assert answer["message"]
 
 
 def test_the_timeline_is_there_before_all_is_checked_and_then_says_what_is_damaged(
@@ -217,9 +213,9 @@ def test_the_timeline_is_there_before_all_is_checked_and_then_says_what_is_damag
     VERIFIED.forget(tracked.folder)
     known = []
     for check in ("false", "true", "false"):
-        answer = studio.client.get(f"{RUN}/frames", params={"check": check}).json()
+        answer = studio.get(f"{RUN}/frames", params={"check": check})
         frames = [entry["frame"] for entry in answer["frames"]]
-        done = studio.client.get(RUN, params={"check": "false"}).json()["run"]["done"]
+        done = studio.get(RUN, params={"check": "false"})["run"]["done"]
         known.append((answer["checked"], frames, answer["damaged"], done))
     assert known == [(False, [0, 1], {}, 2), *[(True, [0], {"1": "layer 1"}, 1)] * 2]
 
@@ -235,10 +231,10 @@ def test_every_flip_in_a_store_is_a_named_gap_and_no_fault_of_the_server(
     for _ in range(40):
         frame = flip_stored(store, rng)
         VERIFIED.forget(tracked.folder)
-        answer = studio.client.get(f"{RUN}/frames").json()
+        answer = studio.get(f"{RUN}/frames")
         assert list(answer["damaged"]) == [str(frame)]
         assert [entry["frame"] for entry in answer["frames"]] == [1 - frame]
-        [line] = studio.client.get("/api/sessions/take1/runs").json()["runs"]
+        [line] = studio.get("/api/sessions/take1/runs")["runs"]
         assert (line["damaged"], line["done"]) == ([frame], 1)
         statuses = {
             studio.client.get(f"{RUN}/frames/{frame}{end}").status_code
@@ -252,14 +248,13 @@ def test_every_flip_in_a_store_is_a_named_gap_and_no_fault_of_the_server(
 
 def test_notes_on_frames(studio: Studio, session: Session, tracked: StoredRun) -> None:
     place = f"/api/sessions/{session.name}/runs/{tracked.name}"
-    assert studio.client.get(f"{place}/notes").json() == {"notes": []}
-    put = studio.client.put(f"{place}/frames/1/note", json={"text": "the arm, hidden"})
-    assert put.status_code == 200, put.text
-    assert [(one["frame"], one["text"]) for one in put.json()["notes"]] == [(1, "the arm, hidden")]
-    assert studio.client.put(f"{place}/frames/0/note", json={}).json()["notes"][0]["text"] == ""
+    assert studio.get(f"{place}/notes") == {"notes": []}
+    put = studio.put(f"{place}/frames/1/note", {"text": "the arm, hidden"})
+    assert [(one["frame"], one["text"]) for one in put["notes"]] == [(1, "the arm, hidden")]
+    assert studio.put(f"{place}/frames/0/note", {})["notes"][0]["text"] == ""
     table = studio.client.get(f"{place}/notes.csv").text.splitlines()
     assert table[0] == "frame,text,made"
     assert table[2].startswith('1,"the arm, hidden",')
-    assert len(studio.client.delete(f"{place}/frames/1/note").json()["notes"]) == 1
-    assert studio.client.put(f"{place}/frames/99/note", json={}).status_code == 404
-    assert studio.client.put(f"{place}/frames/1/note", json={"text": 5 * 1000 * "x"}).status_code == 422
+    assert len(studio.delete(f"{place}/frames/1/note")["notes"]) == 1
+    studio.put(f"{place}/frames/99/note", {}, code=404)
+    studio.put(f"{place}/frames/1/note", {"text": 5 * 1000 * "x"}, code=422)

@@ -26,7 +26,7 @@ def test_a_run_is_made_with_what_was_requested(studio: Studio) -> None:
         "tracker": "condensation", "first": 1, "last": 3, "seed": 9, "settings": {"particles": 500}, "name": "c",
         "body": "human31",
     }  # fmt: skip
-    line = studio.client.post("/api/sessions/take1/runs", json=request).json()
+    line = studio.post("/api/sessions/take1/runs", request)
     assert (line["name"], line["tracker"], line["first"], line["last"], line["seed"]) == (
         "c",
         "condensation",
@@ -35,10 +35,10 @@ def test_a_run_is_made_with_what_was_requested(studio: Studio) -> None:
         9,
     )
     assert line["status"] == "new"
-    detail = studio.client.get("/api/sessions/take1/runs/c").json()
+    detail = studio.get("/api/sessions/take1/runs/c")
     assert detail["settings"]["particles"] == 500
     assert len(detail["parameters"]) == len(detail["sigma"]) == len(detail["start_pose"]) == 31
-    assert studio.client.post("/api/sessions/take1/runs", json={}).json()["name"] == "run-2"
+    assert studio.post("/api/sessions/take1/runs", {})["name"] == "run-2"
 
 
 @pytest.mark.parametrize(
@@ -63,11 +63,10 @@ def test_a_run_is_made_with_what_was_requested(studio: Studio) -> None:
 def test_what_cannot_be_is_refused_in_words_and_nothing_is_made(
     studio: Studio, sent: dict[str, object], status: int
 ) -> None:
-    answer = studio.client.post("/api/sessions/take1/runs", json=sent)
-    assert answer.status_code == status, answer.text
-    assert set(answer.json()) == {"code", "message", "hint", "status"}
-    assert answer.json()["message"]
-    assert studio.client.get("/api/sessions/take1/runs").json()["runs"] == []
+    answer = studio.post("/api/sessions/take1/runs", sent, code=status)
+    assert set(answer) == {"code", "message", "hint", "status"}
+    assert answer["message"]
+    assert studio.get("/api/sessions/take1/runs")["runs"] == []
 
 
 @pytest.mark.parametrize(
@@ -87,68 +86,65 @@ def test_a_command_names_its_run_whatever_is_known_to_be_open(
     studio: Studio, tracked: StoredRun, path: str, kind: type, known: StateChanged
 ) -> None:
     studio.control.state = known
-    answer = studio.client.post(f"{RUN}/{path}")
-    assert answer.status_code == 202
+    answer = studio.post(f"{RUN}/{path}", code=202)
     assert posted(studio) == [kind]
     (sent,) = studio.control.commands
     assert (sent.session, sent.run) == (str(tracked.folder.parents[1]), str(tracked.folder))
-    assert answer.json() == {"identifier": sent.identifier, "command": kind.__name__}
+    assert answer == {"identifier": sent.identifier, "command": kind.__name__}
 
 
 def test_frames_to_seek_and_to_anneal_again(studio: Studio, tracked: StoredRun) -> None:
     studio.control.state = state_of("take1", "first", "paused")
-    studio.client.post(f"{RUN}/seek", json={"frame": 1})
-    studio.client.post(f"{RUN}/reanneal", json={"frame": 1, "keep": True})
-    studio.client.post(f"{RUN}/reanneal", json={})
+    studio.post(f"{RUN}/seek", {"frame": 1})
+    studio.post(f"{RUN}/reanneal", {"frame": 1, "keep": True})
+    studio.post(f"{RUN}/reanneal", {})
     seek, kept, selected = studio.control.commands
     assert isinstance(seek, commands.Seek)
     assert isinstance(kept, commands.Reanneal)
     assert isinstance(selected, commands.Reanneal)
     assert (seek.frame, kept.frame, kept.keep, selected.frame, selected.keep) == (1, 1, True, -1, False)
-    assert studio.client.post(f"{RUN}/seek", json={"frame": -2}).status_code == 422
-    assert studio.client.post(f"{RUN}/seek", json={}).status_code == 422
+    studio.post(f"{RUN}/seek", {"frame": -2}, code=422)
+    studio.post(f"{RUN}/seek", {}, code=422)
 
 
 def test_while_another_run_is_tracked_a_start_waits_and_the_rest_is_refused(
     studio: Studio, tracked: StoredRun
 ) -> None:
     studio.control.state = state_of("take1", "other", "tracking")
-    assert studio.client.post(f"{RUN}/start").json()["command"] == "Start"
-    refused = studio.client.post(f"{RUN}/step-layer")
-    assert refused.status_code == 409
-    assert "'other'" in refused.json()["message"]
-    assert studio.client.patch(f"{RUN}/settings", json={"survival": 0.4}).status_code == 409
-    assert studio.client.post(f"{RUN}/dequeue").json()["command"] == "Dequeue"
+    assert studio.post(f"{RUN}/start")["command"] == "Start"
+    refused = studio.post(f"{RUN}/step-layer", code=409)
+    assert "'other'" in refused["message"]
+    studio.patch(f"{RUN}/settings", {"survival": 0.4}, code=409)
+    assert studio.post(f"{RUN}/dequeue")["command"] == "Dequeue"
     assert posted(studio) == [commands.Start, commands.Dequeue]
 
 
 def test_after_the_process_died_start_revives_it_and_goes_on(studio: Studio, tracked: StoredRun) -> None:
     studio.control.state = state_of("take1", "first", "lost")
-    assert studio.client.get("/api/worker").json()["state"] == "lost"
-    assert studio.client.post(f"{RUN}/start").status_code == 202
+    assert studio.get("/api/worker")["state"] == "lost"
+    studio.post(f"{RUN}/start", code=202)
     assert "restart resume=False" in studio.control.calls
     assert posted(studio) == [commands.Start]
     studio.control.state = state_of("take1", "first", "lost")
-    assert studio.client.post("/api/worker/restart").status_code == 202
+    studio.post("/api/worker/restart", code=202)
     assert "restart resume=True" in studio.control.calls
 
 
 def test_the_pace_is_set_and_reported_with_its_choices(studio: Studio) -> None:
-    response = studio.client.get("/api/worker/pace").json()
+    response = studio.get("/api/worker/pace")
     assert response["seconds_a_layer"] == 0.0
     assert [choice["label"] for choice in response["choices"]] == [
         "full speed", "10 layers/s", "3 layers/s", "1 layer/s",
     ]  # fmt: skip
     slow = response["choices"][2]["seconds_a_layer"]
-    answer = studio.client.post("/api/worker/pace", json={"seconds_a_layer": slow})
-    assert answer.status_code == 202
+    answer = studio.post("/api/worker/pace", {"seconds_a_layer": slow}, code=202)
     (sent,) = studio.control.commands
     assert isinstance(sent, commands.SetPace)
     assert sent.seconds_a_layer == slow
-    assert answer.json() == {"identifier": sent.identifier, "command": "SetPace"}
+    assert answer == {"identifier": sent.identifier, "command": "SetPace"}
     studio.control.state = dataclasses.replace(state_of("take1", "first", "tracking"), seconds_a_layer=0.05)
-    assert studio.client.get("/api/worker").json()["seconds_a_layer"] == 0.05
-    response = studio.client.get("/api/worker/pace").json()
+    assert studio.get("/api/worker")["seconds_a_layer"] == 0.05
+    response = studio.get("/api/worker/pace")
     assert response["choices"][1] == {"label": "20 layers/s", "seconds_a_layer": 0.05}
 
 
@@ -156,18 +152,17 @@ def test_the_pace_is_set_and_reported_with_its_choices(studio: Studio) -> None:
     "body", ["{}", *(f'{{"seconds_a_layer": {n}}}' for n in ("-0.1", "10.5", "NaN", '"slow"'))]
 )
 def test_what_is_no_pace_is_refused(studio: Studio, body: str) -> None:
-    answer = studio.client.post(
-        "/api/worker/pace", content=body, headers={"content-type": "application/json"}
+    answer = studio.post(
+        "/api/worker/pace", content=body, headers={"content-type": "application/json"}, code=422
     )
-    assert answer.status_code == 422
-    assert answer.json()["message"]
+    assert answer["message"]
     assert studio.control.commands == []
 
 
 def test_the_log_is_the_runs_own_file(studio: Studio, tracked: StoredRun) -> None:
     append_to_log(tracked.folder, "info", "Tracking from frame 0.")
     append_to_log(tracked.folder, "warning", "Slow.")
-    lines = studio.client.get(f"{RUN}/log").json()["lines"]
+    lines = studio.get(f"{RUN}/log")["lines"]
     assert [(line["level"], line["text"]) for line in lines] == [
         ("info", "Tracking from frame 0."),
         ("warning", "Slow."),
@@ -178,9 +173,7 @@ def test_the_log_is_the_runs_own_file(studio: Studio, tracked: StoredRun) -> Non
 
 
 def test_knobs_are_the_declarations(studio: Studio) -> None:
-    response = studio.client.get(
-        "/api/knobs", params={"tracker": "annealed", "weighting": "edge-region"}
-    ).json()
+    response = studio.get("/api/knobs", params={"tracker": "annealed", "weighting": "edge-region"})
     survival = next(entry for entry in response["knobs"] if entry["name"] == "survival")
     declared = next(entry for entry in knobs_of(AnnealedSettings) if entry.name == "survival")
     for name in ("label", "low", "high", "step", "default", "help", "unit", "group"):
@@ -189,11 +182,11 @@ def test_knobs_are_the_declarations(studio: Studio) -> None:
     assert survival["takes_effect"] == "next layer"
     assert response["values"]["layers"] == AnnealedSettings().layers
     assert response["json_schema"]["properties"]["layers"]["maximum"] == 60
-    assert studio.client.get("/api/knobs", params={"tracker": "none"}).status_code == 422
+    studio.get("/api/knobs", params={"tracker": "none"}, code=422)
 
 
 def test_choices_for_a_new_run(studio: Studio) -> None:
-    response = studio.client.get("/api/choices").json()
+    response = studio.get("/api/choices")
     assert {"annealed", "condensation"} <= {entry["name"] for entry in response["trackers"]}
     assert {"edge-region", "bodytrack", "template"} <= {entry["name"] for entry in response["weightings"]}
     sizes = {entry["name"]: entry["parameters"] for entry in response["bodies"]}
@@ -201,11 +194,11 @@ def test_choices_for_a_new_run(studio: Studio) -> None:
     own = studio.workspace.root / "bodies"
     own.mkdir()
     (own / "broken.toml").write_text("nonsense = [")
-    assert "broken" not in {entry["name"] for entry in studio.client.get("/api/choices").json()["bodies"]}
+    assert "broken" not in {entry["name"] for entry in studio.get("/api/choices")["bodies"]}
 
 
 def test_settings_in_use_and_every_change_before(studio: Studio, tracked: StoredRun) -> None:
-    response = studio.client.get(f"{RUN}/settings").json()
+    response = studio.get(f"{RUN}/settings")
     assert (response["version"], response["frame"], response["layer"]) == (2, 1, 1)
     assert response["values"]["survival"] == 0.77
     [change] = response["changes"]
@@ -213,17 +206,16 @@ def test_settings_in_use_and_every_change_before(studio: Studio, tracked: Stored
 
 
 def test_a_change_is_checked_here_and_handed_on(studio: Studio, tracked: StoredRun) -> None:
-    assert studio.client.patch(f"{RUN}/settings", json={"survival": 0.6, "layers": 5}).status_code == 200
+    studio.patch(f"{RUN}/settings", {"survival": 0.6, "layers": 5})
     assert studio.control.changes == [{"survival": 0.6, "layers": 5}]
     for wrong in ({"survival": 99.0}, {"survival": "x"}, {"none": 1}, {"layers": 2.5}, {"survival": None}):
-        answer = studio.client.patch(f"{RUN}/settings", json=wrong)
-        assert answer.status_code == 422, wrong
+        studio.patch(f"{RUN}/settings", wrong, code=422)
     assert len(studio.control.changes) == 1
 
 
 def test_the_shown_frame_is_the_one_that_is_annealed_again(studio: Studio, tracked: StoredRun) -> None:
-    studio.client.patch(f"{RUN}/settings", params={"frame": 1}, json={"survival": 0.6})
-    studio.client.patch(f"{RUN}/settings", json={"survival": 0.7})
+    studio.patch(f"{RUN}/settings", params={"frame": 1}, body={"survival": 0.6})
+    studio.patch(f"{RUN}/settings", {"survival": 0.7})
     one, other = studio.control.commands
     assert isinstance(one, commands.ChangeSettings)
     assert isinstance(other, commands.ChangeSettings)
@@ -279,12 +271,11 @@ def test_a_doubted_calibration_is_reported_and_tracked_only_if_requested(studio:
     """What measuring the masks finds is remembered by `provenance`; here it is written down as it would be."""
     doubt = "Cameras cam1 and cam2 seem to be exchanged. Exchange their names."
     note(studio.workspace.session("take1"), "background", "in doubt", good=False, stops=(doubt,))
-    assert studio.client.get("/api/sessions/take1").json()["doubts"] == [doubt]
-    refused = studio.client.post("/api/sessions/take1/runs", json={"name": "refused"})
-    assert refused.status_code == 422
-    assert doubt in refused.json()["message"]
-    assert studio.client.get("/api/sessions/take1/runs/refused").status_code == 404
+    assert studio.get("/api/sessions/take1")["doubts"] == [doubt]
+    refused = studio.post("/api/sessions/take1/runs", {"name": "refused"}, code=422)
+    assert doubt in refused["message"]
+    studio.get("/api/sessions/take1/runs/refused", code=404)
     request = {"name": "wished", "allow_inconsistent": True}
-    assert studio.client.post("/api/sessions/take1/runs", json=request).status_code == 201
-    notes = studio.client.get("/api/sessions/take1/runs/wished").json()["notes"]
+    studio.post("/api/sessions/take1/runs", request, code=201)
+    notes = studio.get("/api/sessions/take1/runs/wished")["notes"]
     assert f"Tracked despite: {doubt}" in notes

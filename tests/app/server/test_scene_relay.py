@@ -56,7 +56,7 @@ def relayed(tmp_path: Path, inner: GuardedServer) -> Iterator[Studio]:
     scenes = RecordingScenes(RecordingStage(inner.get_port(), inner.relay_headers()))
     app = build_app(workspace, control, scenes, Tokens(TOKEN, VIEWERS_TOKEN))
     with serving(app) as base, let_in(base, TOKEN) as client:
-        yield Studio(base, client, control, scenes, workspace, app, tmp_path / "log")
+        yield Studio(client, base, control, scenes, workspace, app, tmp_path / "log")
 
 
 def opened(
@@ -96,8 +96,7 @@ def test_the_client_comes_from_the_installed_wheel(relayed: Studio) -> None:
     begin, own, end = page.content.partition(assets_folder().joinpath("js", "scene_context.js").read_bytes())
     assert own
     assert (begin + end).replace(b"<script></script>", b"", 1) == build.read_bytes()
-    again = relayed.client.get("/scene/", headers={"if-none-match": page.headers["etag"]})
-    assert again.status_code == 304
+    relayed.get("/scene/", headers={"if-none-match": page.headers["etag"]}, code=304)
     assert relayed.client.get("/scene").headers["location"] == "/scene/"
 
 

@@ -18,7 +18,7 @@ from studio.sessions.stored_run import StoredRun
 
 def sessions(studio: Studio) -> dict[str, dict]:
     """The list, by name."""
-    return {entry["name"]: entry for entry in studio.client.get("/api/sessions").json()["sessions"]}
+    return {entry["name"]: entry for entry in studio.get("/api/sessions")["sessions"]}
 
 
 def test_the_list_says_what_the_rail_shows(studio: Studio, tracked: StoredRun) -> None:
@@ -38,8 +38,7 @@ def test_the_list_says_what_the_rail_shows(studio: Studio, tracked: StoredRun) -
 
 
 def test_runs_come_newest_first(studio: Studio, tracked: StoredRun) -> None:
-    made = studio.client.post("/api/sessions/take1/runs", json={"name": "second"})
-    assert made.status_code == 201
+    studio.post("/api/sessions/take1/runs", {"name": "second"}, code=201)
     assert [run["name"] for run in sessions(studio)["take1"]["runs"]] == ["second", "first"]
 
 
@@ -53,7 +52,7 @@ def test_a_session_that_cannot_be_opened_says_why_and_spoils_nothing(studio: Stu
 
 
 def test_the_detail_shows_cameras_matching_body_and_subject(studio: Studio, session: Session) -> None:
-    response = studio.client.get("/api/sessions/take1").json()
+    response = studio.get("/api/sessions/take1")
     assert [camera["name"] for camera in response["cameras"]] == ["cam1", "cam2"]
     first = session.cameras()[0]
     assert np.allclose(response["cameras"][0]["centre"], first.centre)
@@ -105,12 +104,12 @@ def test_delete_goes_to_the_trash_and_comes_back(studio: Studio, tracked: Stored
 
 def test_what_is_open_is_let_go_of_before_it_moves(studio: Studio, tracked: StoredRun) -> None:
     studio.control.state = state_of("take1", "first", "finished")
-    assert studio.client.patch("/api/sessions/take1", json={"name": "moved"}).status_code == 200
+    studio.patch("/api/sessions/take1", {"name": "moved"})
     assert [type(command) for command in studio.control.commands] == [Close]
     (sent,) = studio.control.commands
     assert (sent.session, sent.run) == (str(studio.workspace.root / "take1"), "")
     studio.control.state = state_of("other", "first", "tracking")
-    assert studio.client.delete("/api/sessions/moved").status_code == 200
+    studio.delete("/api/sessions/moved")
     assert len(studio.control.commands) == 1, "a search elsewhere is not waited for"
 
 

@@ -31,11 +31,10 @@ def answer(session: Session, request: FitRequest, **_: object) -> FittedSubject:
 
 def test_a_fit_runs_in_the_background_and_is_kept(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     name = SESSION
-    assert studio.client.put(f"/api/sessions/{name}/subject", json={"height_mm": 1800}).status_code == 200
+    studio.put(f"/api/sessions/{name}/subject", {"height_mm": 1800})
     monkeypatch.setattr(person, "fit_session_subject", answer)
-    begun = studio.client.post(f"/api/sessions/{name}/fit-subject", json={"count": 2})
-    assert begun.status_code == 202
-    response = studio.ended(f"/api/subject-fits/{begun.json()['identifier']}")
+    begun = studio.post(f"/api/sessions/{name}/fit-subject", {"count": 2}, code=202)
+    response = studio.ended(f"/api/subject-fits/{begun['identifier']}")
     assert response["state"] == "done"
     assert response["sizes"][0]["after"] == 425.0
     assert response["file"] == "subject.toml"
@@ -48,10 +47,8 @@ def test_a_failure_and_a_cancellation_are_in_words(studio: Studio, monkeypatch: 
         raise RunError("Nothing is to be seen.", "Look at the masks.")
 
     monkeypatch.setattr(person, "fit_session_subject", fails)
-    begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={})
-    assert (
-        studio.ended(f"/api/subject-fits/{begun.json()['identifier']}")["message"] == "Nothing is to be seen."
-    )
+    begun = studio.post(f"/api/sessions/{SESSION}/fit-subject", {})
+    assert studio.ended(f"/api/subject-fits/{begun['identifier']}")["message"] == "Nothing is to be seen."
 
     def waits(*_: object, progress: Callable[[str, int, int], None], **__: object) -> FittedSubject:
         while True:
@@ -59,20 +56,20 @@ def test_a_failure_and_a_cancellation_are_in_words(studio: Studio, monkeypatch: 
             time.sleep(0.01)
 
     monkeypatch.setattr(person, "fit_session_subject", waits)
-    begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={})
-    identifier = begun.json()["identifier"]
-    assert studio.client.delete(f"/api/subject-fits/{identifier}").status_code == 202
+    begun = studio.post(f"/api/sessions/{SESSION}/fit-subject", {})
+    identifier = begun["identifier"]
+    studio.delete(f"/api/subject-fits/{identifier}", code=202)
     assert studio.ended(f"/api/subject-fits/{identifier}")["code"] == "cancelled"
 
 
 def test_a_height_gives_every_length(studio: Studio) -> None:
     place = f"/api/sessions/{SESSION}/subject"
-    small = studio.client.put(place, json={"height_mm": 1600, "body": "human31"}).json()["dimensions"]
-    tall = studio.client.put(place, json={"height_mm": 2000, "body": "human31"}).json()
+    small = studio.put(place, {"height_mm": 1600, "body": "human31"})["dimensions"]
+    tall = studio.put(place, {"height_mm": 2000, "body": "human31"})
     assert tall["height_mm"] == 2000
     assert tall["dimensions"]["left_thigh_length"] == pytest.approx(0.245 * 2000)
     assert small["left_thigh_length"] == pytest.approx(0.245 * 1600)
-    assert studio.client.put(place, json={"height_mm": 18}).status_code == 422
+    studio.put(place, {"height_mm": 18}, code=422)
 
 
 def test_what_is_painted_does_not_count(studio: Studio) -> None:
@@ -80,26 +77,26 @@ def test_what_is_painted_does_not_count(studio: Studio) -> None:
     painted = np.zeros((source.height, source.width), np.uint8)
     painted[:, : source.width // 2] = 255
     place = f"/api/sessions/{SESSION}/exclusions/{source.name}"
-    assert studio.client.get(place).status_code == 404
+    studio.get(place, code=404)
     content = cv2.imencode(".png", painted)[1].tobytes()
-    response = studio.client.put(place, content=content)
-    assert response.json()["pixels"] == source.height * (source.width // 2)
+    response = studio.put(place, content=content)
+    assert response["pixels"] == source.height * (source.width // 2)
     kept = cv2.imdecode(np.frombuffer(studio.client.get(place).content, np.uint8), cv2.IMREAD_GRAYSCALE)
     assert (kept == painted).all()
     wrong = cv2.imencode(".png", painted[1:])[1].tobytes()
-    assert studio.client.put(place, content=wrong).status_code == 422
-    assert studio.client.put(place, content=b"no picture").status_code == 422
-    assert studio.client.put(place, content=b"").json()["pixels"] == 0
-    assert studio.client.get(place).status_code == 404
+    studio.put(place, content=wrong, code=422)
+    studio.put(place, content=b"no picture", code=422)
+    assert studio.put(place, content=b"")["pixels"] == 0
+    studio.get(place, code=404)
 
 
 def test_the_sessions_knobs_are_those_of_its_masks(studio: Studio) -> None:
     place = f"/api/sessions/{SESSION}/evidence"
-    assert studio.client.get(place).json() == {"knobs": {}}
-    assert studio.client.put(place, json={"mask_threshold": 7.0}).status_code == 200
-    assert studio.client.get(place).json()["knobs"] == {"mask_threshold": 7.0}
-    assert studio.client.put(place, json={"mask_threshold": 7000.0}).status_code == 422
-    assert studio.client.put(place, json={"no_such_knob": 1}).status_code == 422
+    assert studio.get(place) == {"knobs": {}}
+    studio.put(place, {"mask_threshold": 7.0})
+    assert studio.get(place)["knobs"] == {"mask_threshold": 7.0}
+    studio.put(place, {"mask_threshold": 7000.0}, code=422)
+    studio.put(place, {"no_such_knob": 1}, code=422)
 
 
 def test_a_preview_takes_knobs_and_changes_nothing(studio: Studio) -> None:
@@ -107,11 +104,9 @@ def test_a_preview_takes_knobs_and_changes_nothing(studio: Studio) -> None:
     view = f"/api/sessions/{SESSION}/frames/0/views/{source.name}.jpg?show=mask"
     usual = studio.client.get(view)
     assert usual.status_code == 200
-    other = studio.client.get(view, params={"show": "mask", "settings": '{"mask_min_component": 100000}'})
-    assert other.status_code == 200
+    studio.get(view, params={"show": "mask", "settings": '{"mask_min_component": 100000}'})
     assert studio.client.get(view).content == usual.content
-    refused = studio.client.get(view, params={"show": "mask", "settings": "no json"})
-    assert refused.status_code == 422
+    studio.get(view, params={"show": "mask", "settings": "no json"}, code=422)
 
 
 def test_a_fit_shows_the_poses_that_it_has(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,16 +118,16 @@ def test_a_fit_shows_the_poses_that_it_has(studio: Studio, monkeypatch: pytest.M
         go.wait(PATIENCE)
         return answer(session, request)
 
-    assert studio.client.put(f"/api/sessions/{SESSION}/subject", json={"height_mm": 1800}).is_success
+    studio.put(f"/api/sessions/{SESSION}/subject", {"height_mm": 1800})
     monkeypatch.setattr(person, "fit_session_subject", fits)
-    begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={"keep": False}).json()
+    begun = studio.post(f"/api/sessions/{SESSION}/fit-subject", {"keep": False})
     try:
         assert looked.wait(PATIENCE)
         place = f"/api/subject-fits/{begun['identifier']}"
-        state = studio.client.get(place).json()
+        state = studio.get(place)
         assert (state["frames"], state["looks"]) == ([2], 1)
         assert studio.client.get(f"{place}/frames/2/views/cam1.jpg").headers["content-type"] == "image/jpeg"
-        assert studio.client.get(f"{place}/frames/3/views/cam1.jpg").status_code == 404
+        studio.get(f"{place}/frames/3/views/cam1.jpg", code=404)
     finally:
         go.set()
     assert studio.ended(f"/api/subject-fits/{begun['identifier']}")["frames"] == [3, 7]
@@ -145,15 +140,15 @@ def test_all_work_is_listed_and_stopped_by_its_name(studio: Studio, monkeypatch:
             time.sleep(0.01)
 
     monkeypatch.setattr(person, "fit_session_subject", waits)
-    begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={}).json()
-    listed = studio.client.get("/api/jobs", params={"session": SESSION, "kind": "subject"}).json()["jobs"]
+    begun = studio.post(f"/api/sessions/{SESSION}/fit-subject", {})
+    listed = studio.get("/api/jobs", params={"session": SESSION, "kind": "subject"})["jobs"]
     [line] = listed
     assert line["at"] == f"/api/subject-fits/{begun['identifier']}"
     assert line["page"] == f"/way?session={SESSION}&step=subject"
-    assert studio.client.get("/api/jobs", params={"session": "other"}).json()["jobs"] == []
-    assert studio.client.delete(f"/api/jobs/subject/{line['key']}").status_code == 202
+    assert studio.get("/api/jobs", params={"session": "other"})["jobs"] == []
+    studio.delete(f"/api/jobs/subject/{line['key']}", code=202)
     assert studio.ended(f"/api/subject-fits/{begun['identifier']}")["state"] == "cancelled"
-    assert studio.client.delete("/api/jobs/subject/none").status_code == 404
+    studio.delete("/api/jobs/subject/none", code=404)
     # Another height makes a fit's answer void.
-    assert studio.client.put(f"/api/sessions/{SESSION}/subject", json={"height_mm": 1700}).is_success
-    assert studio.client.get("/api/jobs").json()["jobs"] == []
+    studio.put(f"/api/sessions/{SESSION}/subject", {"height_mm": 1700})
+    assert studio.get("/api/jobs")["jobs"] == []

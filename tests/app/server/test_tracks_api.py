@@ -29,9 +29,8 @@ def run(studio: Studio, workspace: Workspace) -> StoredRun:
 
 def begun(studio: Studio, verb: str, request: dict) -> dict:
     """The job's state when it has ended."""
-    answer = studio.client.post(f"{RUN}/{verb}", json=request)
-    assert answer.status_code == 202, answer.text
-    return studio.ended(f"/api/track-jobs/{answer.json()['identifier']}")
+    answer = studio.post(f"{RUN}/{verb}", request, code=202)
+    return studio.ended(f"/api/track-jobs/{answer['identifier']}")
 
 
 def test_refined_smoothed_listed_and_downloaded(studio: Studio, run: StoredRun) -> None:
@@ -45,7 +44,7 @@ def test_refined_smoothed_listed_and_downloaded(studio: Studio, run: StoredRun) 
     response = begun(studio, "smooth", {})
     assert response["state"] == "done", response
     assert response["jitter_after_mm"] <= response["jitter_before_mm"]
-    listed = studio.client.get(f"{RUN}/tracks").json()
+    listed = studio.get(f"{RUN}/tracks")
     assert [line["name"] for line in listed["tracks"]] == ["raw", "refined", "smoothed"]
     assert listed["tracks"][2]["made_by"]["from"] == "refined"
     assert listed["tracks"][1]["made_by"]["refinement_steps"] == 4
@@ -70,8 +69,8 @@ def test_a_track_is_drawn_over_the_pictures(studio: Studio, run: StoredRun) -> N
     assert (plain.status_code, other.status_code) == (200, 200)
     assert plain.content != other.content
     assert studio.client.get(view, params={"track": "raw"}).content == plain.content
-    assert studio.client.get(view, params={"track": "none"}).status_code == 404
-    assert studio.client.get(view.replace("/2/", "/5/"), params={"track": "moved"}).status_code == 404
+    studio.get(view, params={"track": "none"}, code=404)
+    studio.get(view.replace("/2/", "/5/"), params={"track": "moved"}, code=404)
 
 
 @pytest.mark.parametrize(
@@ -89,25 +88,24 @@ def test_a_track_is_drawn_over_the_pictures(studio: Studio, run: StoredRun) -> N
     ],
 )
 def test_refusals(studio: Studio, run: StoredRun, verb: str, sent: dict, status: int) -> None:
-    answer = studio.client.post(f"{RUN}/{verb}", json=sent)
-    assert answer.status_code == status, answer.text
-    assert len(studio.client.get(f"{RUN}/tracks").json()["tracks"]) == 1
+    studio.post(f"{RUN}/{verb}", sent, code=status)
+    assert len(studio.get(f"{RUN}/tracks")["tracks"]) == 1
 
 
 def test_a_name_that_is_taken_is_refused_at_once(studio: Studio, run: StoredRun) -> None:
     begun(studio, "smooth", {})
-    assert studio.client.post(f"{RUN}/smooth", json={}).status_code == 409
+    studio.post(f"{RUN}/smooth", {}, code=409)
     assert begun(studio, "smooth", {"replace": True})["state"] == "done"
 
 
 def test_corrected_on_and_back(studio: Studio, run: StoredRun) -> None:
     on = begun(studio, "correct", {"frame": 4, "pose": true_poses()[4].tolist(), "name": "on"})
     assert (on["state"], on["made_run"]) == ("done", "on"), on
-    line = studio.client.get("/api/sessions/toy/runs/on").json()
+    line = studio.get("/api/sessions/toy/runs/on")
     assert "on" in str(line)
     back = begun(studio, "correct", {"frame": 4, "track": "raw", "back_to": 1, "name": "back"})
     assert (back["state"], back["made_run"], back["moved"]) == ("done", "back", 4), back
-    assert studio.client.get("/api/track-jobs/none").status_code == 404
+    studio.get("/api/track-jobs/none", code=404)
 
 
 def test_a_track_is_measured_against_the_joints_of_a_network(
@@ -124,11 +122,11 @@ def test_a_track_is_measured_against_the_joints_of_a_network(
     assert line["mean_mm"] == pytest.approx(30.0, abs=0.1)
     assert line["without_offsets_mm"] == pytest.approx(0.0, abs=0.1)
     assert (line["file"], line["seen"]) == ("landmarks.trc", 1.0)
-    assert studio.client.get(f"{RUN}/exports/landmarks.trc").status_code == 200
-    assert studio.client.get(f"{RUN}/exports").json()["exports"][0]["file"] == "landmarks.trc"
+    studio.get(f"{RUN}/exports/landmarks.trc")
+    assert studio.get(f"{RUN}/exports")["exports"][0]["file"] == "landmarks.trc"
 
 
 def test_one_camera_has_no_joints_in_space(studio: Studio, run: StoredRun) -> None:
     response = begun(studio, "landmarks", {})
     assert (response["state"], response["message"]) == ("failed", "One camera shows no place in space.")
-    assert studio.client.get(f"{RUN}/exports").json()["exports"] == []
+    assert studio.get(f"{RUN}/exports")["exports"] == []

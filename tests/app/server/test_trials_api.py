@@ -37,7 +37,7 @@ def try_frame(studio: Studio, run: StoredRun, survival: float) -> list:
 
 
 def listed(studio: Studio) -> dict:
-    return studio.client.get(f"{RUN}/frames/1/trials").json()
+    return studio.get(f"{RUN}/frames/1/trials")
 
 
 def test_what_was_tried_is_listed_beside_what_is_stored(studio: Studio, tracked: StoredRun) -> None:
@@ -61,23 +61,22 @@ def test_a_trial_stands_in_the_place_of_its_frame(studio: Studio, tracked: Store
     layers = try_frame(studio, tracked, 0.4)
     until(lambda: listed(studio)["trials"])
     name = listed(studio)["trials"][0]["name"]
-    detail = studio.client.get(f"{RUN}/trials/{name}").json()
+    detail = studio.get(f"{RUN}/trials/{name}")
     assert (detail["frame"], len(detail["layers"])) == (1, LAYERS)
     assert detail["layers"][2]["variance_weighed"] == layers[2].variance_weighed.tolist()
     for view in ("variance", "schedule"):
-        told = studio.client.get(f"{RUN}/frames/1/views/{view}?trial={name}").json()
+        told = studio.get(f"{RUN}/frames/1/views/{view}?trial={name}")
         at = [column["key"] for column in told["tables"][0]["columns"]].index("layer")
         assert {row[at] for row in told["tables"][0]["rows"]} == set(range(LAYERS)), view
         assert "tried again, not stored" in told["caption"]
         assert "survival 0.4" in told["caption"]
-    stored = studio.client.get(f"{RUN}/frames/1/views/schedule").json()
+    stored = studio.get(f"{RUN}/frames/1/views/schedule")
     assert len(stored["tables"][0]["rows"]) == 3
-    frames = studio.client.get(f"{RUN}/views/schedule?trial={name}").json()["tables"][0]["rows"]
+    frames = studio.get(f"{RUN}/views/schedule?trial={name}")["tables"][0]["rows"]
     assert [row[0] for row in frames] == [0, 1]
     assert frames[1][2] == pytest.approx(layers[-1].beta)
-    missing = studio.client.get(f"{RUN}/trials/1-nothing")
-    assert missing.status_code == 404
-    assert "same knobs" in missing.json()["hint"]
+    missing = studio.get(f"{RUN}/trials/1-nothing", code=404)
+    assert "same knobs" in missing["hint"]
 
 
 def test_the_second_scene_shows_the_trial(studio: Studio, tracked: StoredRun) -> None:
@@ -87,7 +86,7 @@ def test_the_second_scene_shows_the_trial(studio: Studio, tracked: StoredRun) ->
     headers = {"x-studio-window": "w"}
 
     def show(**request: object) -> None:
-        assert studio.client.post("/api/scene/show", json=request, headers=headers).status_code == 204
+        studio.post("/api/scene/show", request, headers=headers, code=204)
 
     show(trial=trial)
     own = studio.scenes.scene("w").calls

@@ -48,7 +48,7 @@ def test_the_owner_s_folders_uploads_and_trash_are_not_shown(studio: Studio, vie
     ):
         answer = viewer.get(path)
         assert (answer.status_code, answer.json()["code"]) == (403, "read-only"), path
-    assert studio.client.get("/api/folders").status_code == 200
+    studio.get("/api/folders")
 
 
 def test_viewers_compute_one_after_another_and_rest_while_a_run_is_tracked() -> None:
@@ -185,7 +185,7 @@ def test_the_pages_say_that_they_are_read_only_and_do_not_offer_the_rest(
     assert 'href="/way"' in studio.client.get("/").text
     for path in ("/way", "/way/", "/recording"):
         assert viewer.get(path, follow_redirects=True).status_code in (403, 404), path
-    assert studio.client.get("/way").status_code == 200
+    studio.get("/way")
 
 
 def test_a_proxy_s_name_is_answered_and_its_cookie_stays_under_tls(studio: Studio) -> None:

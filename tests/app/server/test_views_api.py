@@ -14,14 +14,14 @@ RUN = "/api/sessions/take1/runs/first"
 
 
 def test_the_registry_names_every_view_with_its_question(studio: Studio) -> None:
-    told = studio.client.get("/api/views").json()["views"]
+    told = studio.get("/api/views")["views"]
     assert [entry["name"] for entry in told] == list(VIEWS)
     assert len(told) == 13
     assert all(entry["title"] and entry["question"].endswith("?") and entry["tables"] for entry in told)
 
 
 def test_variance_has_the_stored_numbers(studio: Studio, tracked: StoredRun) -> None:
-    told = studio.client.get(f"{RUN}/frames/1/views/variance").json()
+    told = studio.get(f"{RUN}/frames/1/views/variance")
     with tracked.results() as results:
         layers = results.layers(1)
     [table] = [entry for entry in told["tables"] if entry["name"] == "layers"]
@@ -40,7 +40,7 @@ def test_variance_has_the_stored_numbers(studio: Studio, tracked: StoredRun) -> 
 def test_the_schedules_effective_number_is_that_of_the_stored_weights(
     studio: Studio, tracked: StoredRun
 ) -> None:
-    told = studio.client.get(f"{RUN}/frames/0/views/schedule").json()
+    told = studio.get(f"{RUN}/frames/0/views/schedule")
     keys = [column["key"] for column in told["tables"][0]["columns"]]
     with tracked.results() as results:
         layers = results.layers(0)
@@ -54,13 +54,12 @@ def test_the_schedules_effective_number_is_that_of_the_stored_weights(
 
 @pytest.mark.parametrize("address", ["frames/0/views/nothing", "views/nothing", "frames/3/views/variance"])
 def test_what_is_not_there_is_named(studio: Studio, tracked: StoredRun, address: str) -> None:
-    refused = studio.client.get(f"{RUN}/{address}")
-    assert refused.status_code == 404
-    assert refused.json()["hint"]
+    refused = studio.get(f"{RUN}/{address}", code=404)
+    assert refused["hint"]
 
 
 def test_whole_runs_have_addresses_of_their_own(studio: Studio, tracked: StoredRun) -> None:
-    told = studio.client.get(f"{RUN}/views/variance?parameter=pelvis_x").json()
+    told = studio.get(f"{RUN}/views/variance?parameter=pelvis_x")
     assert told["frame"] is None
     tables = {table["name"]: table for table in told["tables"]}
     assert set(tables) == {"first", "last", "parameter"}
@@ -75,9 +74,8 @@ def test_whole_runs_have_addresses_of_their_own(studio: Studio, tracked: StoredR
 def test_every_view_answers_from_a_run_without_good_evidence(studio: Studio, tracked: StoredRun) -> None:
     # Poses beside the body, pictures of noise: numbers are of no use, but nothing fails.
     for name in VIEWS:
-        found = studio.client.get(f"{RUN}/frames/0/views/{name}")
-        assert found.status_code == 200, found.text
-        assert studio.client.get(f"{RUN}/views/{name}").status_code == 200
+        studio.get(f"{RUN}/frames/0/views/{name}")
+        studio.get(f"{RUN}/views/{name}")
 
 
 @pytest.mark.parametrize(
@@ -92,32 +90,30 @@ def test_every_view_answers_from_a_run_without_good_evidence(studio: Studio, tra
 def test_a_selection_that_is_not_there_is_named(
     studio: Studio, tracked: StoredRun, query: str, word: str
 ) -> None:
-    refused = studio.client.get(f"{RUN}/frames/0/{query}")
-    assert refused.status_code == 404
-    assert word in refused.json()["message"]
+    refused = studio.get(f"{RUN}/frames/0/{query}", code=404)
+    assert word in refused["message"]
 
 
 def test_seeds_are_a_job(studio: Studio, tracked: StoredRun) -> None:
-    begun = studio.client.post(f"{RUN}/frames/1/seeds", json={"count": 2})
-    assert begun.status_code == 202
-    address = f"/api/seeds/{begun.json()['identifier']}"
-    until(lambda: studio.client.get(address).json()["state"] in ("done", "failed"))
-    assert studio.client.get(address).json()["state"] == "done"
-    told = studio.client.get(f"{RUN}/frames/1/views/seeds").json()
+    begun = studio.post(f"{RUN}/frames/1/seeds", {"count": 2}, code=202)
+    address = f"/api/seeds/{begun['identifier']}"
+    until(lambda: studio.get(address)["state"] in ("done", "failed"))
+    assert studio.get(address)["state"] == "done"
+    told = studio.get(f"{RUN}/frames/1/views/seeds")
     [table] = [entry for entry in told["tables"] if entry["name"] == "seeds"]
     assert [row[0] for row in table["rows"]] == [4, 5]
-    assert studio.client.post(f"{RUN}/frames/1/seeds", json={"count": 1}).status_code == 422
-    assert studio.client.post(f"{RUN}/frames/3/seeds", json={}).status_code == 404
+    studio.post(f"{RUN}/frames/1/seeds", {"count": 1}, code=422)
+    studio.post(f"{RUN}/frames/3/seeds", {}, code=404)
 
 
 def test_runs_are_compared(studio: Studio, session: Session, tracked: StoredRun) -> None:
     other = prepare_run(session, name="second", seed=4, knobs={"survival": 0.5}, fit_shape=False)
-    told = studio.client.get("/api/compared-runs?run=take1/first&run=take1/second").json()
+    told = studio.get("/api/compared-runs?run=take1/first&run=take1/second")
     assert told["runs"] == ["take1/first", "take1/second"]
     tables = {table["name"]: table for table in told["tables"]}
     rows = {row[0]: row[1:] for row in tables["settings"]["rows"]}
     assert rows["seed"] == [3, 4]
     assert rows["survival"] == [0.77, other.record.settings["survival"]]
     assert [row[:2] for row in tables["curves"]["rows"]] == [["take1/first", 0], ["take1/first", 1]]
-    assert studio.client.get("/api/compared-runs?run=take1/first").status_code == 409
-    assert studio.client.get("/api/compared-runs?run=first&run=take1/first").status_code == 409
+    studio.get("/api/compared-runs?run=take1/first", code=409)
+    studio.get("/api/compared-runs?run=first&run=take1/first", code=409)

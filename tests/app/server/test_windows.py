@@ -9,6 +9,7 @@ from contextlib import ExitStack
 import httpx
 import pytest
 import viser
+from api_driver import ApiDriver
 from scene_messages import PanelReader
 from waiting import until
 from web_doubles import TOKEN, RecordingControl, cookie_header, let_in, serving, state_of
@@ -43,13 +44,14 @@ def runs(session: Session) -> list[str]:
     return [f"run-{number}" for number in range(10)]
 
 
-class Windows:
+class Windows(ApiDriver):
     """The real scenes behind the real application, and the windows that a test opens on them."""
 
     def __init__(
         self, base: str, client: httpx.Client, scenes: WindowScenes, control: RecordingControl
     ) -> None:
-        self.base, self.client, self.scenes, self.control = base, client, scenes, control
+        super().__init__(client)
+        self.base, self.scenes, self.control = base, scenes, control
 
     def socket(self, path: str, *protocols: str) -> ClientConnection:
         return connect(
@@ -120,19 +122,19 @@ def test_frames_layers_options_and_edits_are_a_window_s_own(windows: Windows, ru
     windows.show("b", layer=0, look_through="cam2")
     edit = {"session": "take1", "run": runs[2], "frame": 3}
     own = {name: {"x-studio-window": name} for name in "abc"}
-    assert windows.client.post("/api/scene/edit", json=edit, headers=own["c"]).status_code == 202
+    windows.post("/api/scene/edit", edit, headers=own["c"], code=202)
     a, b, c = (windows.scenes.scene(name) for name in "abc")
     until(lambda: (a.shown.run, a.shown.layer, a.shown.follow) == ("run-0", 2, False))
     until(lambda: (b.shown.run, b.shown.layer, b.shown.look_through) == ("run-1", 0, "cam2"))
     until(lambda: c.shown.editing)
-    response = {name: windows.client.get("/api/scene/edit", headers=own[name]).json() for name in "abc"}
+    response = {name: windows.get("/api/scene/edit", headers=own[name]) for name in "abc"}
     assert [response[name]["editing"] for name in "abc"] == [False, False, True]
     assert (a.shown.look_through, c.shown.layer, c.shown.run) == (None, None, "run-2")
     until(lambda: not a._controller.model.options.dark)
     assert b._controller.model.options.dark
     assert b._controller.model.options.trails
-    windows.client.delete("/api/scene/edit", headers=own["a"])
-    assert windows.client.get("/api/scene/edit", headers=own["c"]).json()["editing"]
+    windows.delete("/api/scene/edit", headers=own["a"])
+    assert windows.get("/api/scene/edit", headers=own["c"])["editing"]
 
 
 def test_knobs_that_come_into_use_are_seen_where_their_run_is_shown(
@@ -163,7 +165,7 @@ def test_a_scene_reports_its_moves_to_its_own_window_only(windows: Windows, runs
         windows.scenes.scene("a")._controller.post(lambda model: select(model, layer=3))
         # The same for all, after it: what comes to the other window before this is all that it was sent.
         until(lambda: windows.scenes.scene("a").shown.layer == 3)
-        windows.client.post("/api/sessions/take1/duplicate", json={"name": "end"})
+        windows.post("/api/sessions/take1/duplicate", {"name": "end"})
 
         def before_the_end(socket: ClientConnection) -> list[dict]:
             heard = []
@@ -180,7 +182,7 @@ def test_a_run_that_is_deleted_leaves_every_window_that_shows_it(windows: Window
         windows.show(window, session="take1", run=name)
     scenes = windows.scenes.open_scenes()
     until(lambda: all(scenes[window].shown.run for window in "abc"))
-    assert windows.client.delete("/api/sessions/take1/runs/run-0").status_code == 200
+    windows.delete("/api/sessions/take1/runs/run-0")
     until(lambda: [scenes[window].shown.run for window in "abc"] == ["", "run-1", ""])
 
 
@@ -259,6 +261,5 @@ def test_half_of_the_scenes_are_kept_for_the_owner(
 
 def test_a_window_is_named_by_letters_and_digits(windows: Windows) -> None:
     for name in ("a b", "ä", "../x", "x" * 65):
-        answer = windows.client.post("/api/scene/show", json={}, headers={"x-studio-window": name.encode()})
-        assert answer.status_code == 422, name
+        windows.post("/api/scene/show", {}, headers={"x-studio-window": name.encode()}, code=422)
     assert not windows.scenes.open_scenes()

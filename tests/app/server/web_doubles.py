@@ -11,8 +11,8 @@ from types import SimpleNamespace
 import httpx
 import numpy as np
 import uvicorn
+from api_driver import ApiDriver
 from fastapi import FastAPI
-from waiting import until
 
 from studio.app.scene.model import LayerPlayback, LiveSearch, Selection
 from studio.app.scene.scene_pictures import Film, Report, UnseenSceneError
@@ -236,11 +236,10 @@ class RecordingPoses:
 
 
 @dataclass
-class Studio:
+class Studio(ApiDriver):
     """A served application with everything that stands behind it."""
 
     base: str
-    client: httpx.Client
     control: RecordingControl
     scenes: RecordingScenes
     workspace: Workspace
@@ -251,18 +250,6 @@ class Studio:
     def stage(self) -> RecordingStage:
         """The scene of callers that name no window."""
         return self.scenes.plain
-
-    def ended(self, address: str, entry: str = "") -> dict:
-        """The state of the job at an address (or in an entry of the answer) once it is over."""
-        state: dict = {}
-
-        def is_over() -> bool:
-            answer = self.client.get(address).json()
-            state.update((answer[entry] if entry else answer) or {})
-            return state.get("state", "queued") not in ("queued", "running", "cancelling")
-
-        until(is_over)
-        return state
 
 
 @contextmanager
