@@ -99,7 +99,6 @@ def take(page: Page, window: StudioPage, picture: Picture) -> None:
     place = GUIDE / picture.file
     if picture.part == SCENE:
         box = page.locator(SCENE).bounding_box()
-        assert box is not None
         clip = {**box, "width": WITHOUT_PANEL * box["width"]}
         page.screenshot(path=place, type="jpeg", quality=82, clip=clip)  # pyright: ignore[reportArgumentType]
     elif picture.part:

@@ -201,7 +201,6 @@ def test_parameters_of_a_limb_are_neighbours_and_every_body_cites_its_source(nam
     groups = [entry.limb for entry in body.parameters]
     changes = sum(one != two for one, two in itertools.pairwise(groups))
     assert changes == len(set(groups)) - 1
-    assert body.definition is not None
     assert body.definition.source
     assert any(entry.parent == WORLD for entry in body.definition.joints)
 

@@ -103,7 +103,6 @@ def test_the_root_moves_to_its_frame(name: str) -> None:
     body = load_body(name)
     dragger = Dragger(body)
     before = dragger.root_frame(body.neutral)
-    assert before is not None
     turn = rotation_from_vector(np.array([0.2, -0.1, 0.9]))
     goal = np.column_stack([turn @ before[:, :3], before[:, 3] + [300.0, -200.0, 50.0]])
     found = dragger.with_root(body.neutral, goal)

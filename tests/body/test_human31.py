@@ -112,7 +112,6 @@ def test_outlines_lie_inside_the_masks_as_far_as_the_data_dictionary_says(
     frames = limb_frames(body, _numbers(lee_walk / "InitialPose.txt"))
     corners, _ = project(camera, limb_outlines(kinematic_tables(body).limb_shape, frames, camera)[0])
     mask = cv2.imread(str(lee_walk / f"FG{number}" / "image0000.bmp"), cv2.IMREAD_GRAYSCALE)
-    assert mask is not None
     # A pixel is drawn when its centre lies in a quadrilateral; printed shares are rounded to a thousandth.
     rows, columns = np.mgrid[:480, :640]
     drawn = np.zeros(mask.shape, bool)

@@ -255,7 +255,6 @@ def test_a_meshs_cone_is_that_of_a_cone() -> None:
     low = np.column_stack([np.full(60, -100.0), 40.0 * ring])
     high = np.column_stack([np.full(60, 200.0), 20.0 * ring])
     part = fitted_cone(np.vstack([low, high]))
-    assert part is not None
     np.testing.assert_allclose(part.start, [-100.0, 0.0, 0.0], atol=2.0)
     np.testing.assert_allclose(part.turn[:, 2], [1.0, 0.0, 0.0])
     assert part.length == pytest.approx(300.0)

@@ -32,7 +32,6 @@ LENGTHS = np.array([entry.kind == "length" for entry in PERSON.parameters])
 
 
 def shrunk(body: BodyModel, factor: float = EIGHTH) -> BodyModel:
-    assert body.definition is not None
     entries = body.definition.dimensions
     lengths = {key: factor * value for key, value in body.dimensions.items() if entries[key].ratio is None}
     return with_dimensions(body, lengths)

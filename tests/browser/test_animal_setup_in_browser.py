@@ -94,7 +94,6 @@ def paint(page: Page, stroke: dict[str, Any], turns: int) -> None:
     canvas = page.locator(".strokes-canvas")
     canvas.scroll_into_view_if_needed()
     box = canvas.bounding_box()
-    assert box is not None
     scale = box["width"] / SIZE[turns % 2]
     upright = [TURNED[turns](x, y) for x, y in stroke["points"]]
     places = [(box["x"] + scale * (x + 0.5), box["y"] + scale * (y + 0.5)) for x, y in upright]

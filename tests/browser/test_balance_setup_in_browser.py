@@ -197,7 +197,6 @@ def test_export(guided: GuidedSetup, tmp_path: Path) -> None:
     assert file.name == "balance-man-run-2-smoothed.bvh"
     with contextlib.redirect_stdout(io.StringIO()):
         read = bvhsdk.ReadFile(str(file))
-        assert read is not None
         joints = read.getlistofjoints()
         assert joints
         assert read.frames == FRAMES

@@ -194,7 +194,6 @@ def test_annealing_is_seen_on_the_first_screen(browser: Browser, demo: StudioSer
     def seen(points: np.ndarray) -> np.ndarray:
         """Pixels of the window."""
         box = page.frame_locator("#scene").locator("canvas").first.bounding_box()
-        assert box is not None
         shares = on_screen(points, window.wire.eye, *window.wire.lens)[:, :2]
         return np.array([box["x"], box["y"]]) + shares * np.array([box["width"], box["height"]])
 
@@ -508,8 +507,6 @@ def test_camera_views_with_every_overlay(paused: StudioPage, artefacts: Path) ->
     large = page.locator("dialog[open] img")
     until(page, lambda: large.evaluate("image => image.naturalHeight") >= 480)
     picture, frame = large.bounding_box(), page.locator("dialog[open]").bounding_box()
-    assert picture is not None
-    assert frame is not None
     assert picture["width"] <= frame["width"], "the whole picture is seen"
     assert picture["height"] <= frame["height"]
     paused.shoot(artefacts / "page-camera-enlarged-dark-1280x800.png")

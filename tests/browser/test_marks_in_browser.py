@@ -57,7 +57,6 @@ def test_the_marks_are_named_reported_and_reached_by_keys(
         window.key("p")
         window.until(f"get('frame') === {frame}")
     box = track.bounding_box()
-    assert box is not None
     page.mouse.move(box["x"] + 6 + 9 / (len(WENT) - 1) * (box["width"] - 12), box["y"] + 20)
     title = track.get_attribute("title") or ""
     assert title.startswith("frame 9: no evidence – nothing to be seen: the pose is held; limb lost (truth)")

@@ -32,7 +32,6 @@ def workspace(ball: PatchedBall) -> Path:
 def paint(page: Page, points: tuple[tuple[float, float], ...]) -> None:
     """A stroke with the mouse, points in pixels of the picture."""
     box = page.locator(".strokes-canvas").bounding_box()
-    assert box is not None
     scale = box["width"] / SIZE[0]
     places = [(box["x"] + scale * (x + 0.5), box["y"] + scale * (y + 0.5)) for x, y in points]
     page.mouse.move(*places[0])

@@ -82,7 +82,6 @@ def test_what_is_drawn_is_the_result_and_opens_the_runs(window: StudioPage, arte
     # The cell of survival 0.2 and particles 10, at the bottom left.
     until(page, window.charts_drawn)
     box = page.locator(".sweep-figure[data-key=map] .figure-chart").bounding_box()
-    assert box is not None
     page.mouse.click(box["x"] + 150, box["y"] + box["height"] - 90)
     page.wait_for_url(re.compile(r"run=sweep-1-p1-s[01]"))
     window.until("get('frame') !== null && get('run')")

@@ -14,7 +14,6 @@ def test_a_start_pose_is_written_and_then_kept(session_on_disk: Session) -> None
     assert printed["confidence"] > 0.8
     assert set(printed["pose"]) == {entry.name for entry in session_on_disk.body().parameters}
     stored = session_on_disk.start_pose()
-    assert stored is not None
     assert stored.tolist() == pytest.approx(list(printed["pose"].values()))
     second = call("initialise toy --frame 3 --seed 1")
     assert "start_pose-frame-3.csv" in second.stdout

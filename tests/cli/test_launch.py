@@ -52,7 +52,6 @@ def started(folder: Path, text: str) -> subprocess.Popen[str]:
 def served(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """The studio in a process of its own, as a command would start it, and its printed address."""
     process = started(tmp_path, SERVE)
-    assert process.stdout is not None
     line = process.stdout.readline()
     try:
         yield process, line.removeprefix("Open ").strip()
@@ -78,7 +77,6 @@ def test_the_printed_address_opens_the_studio_and_ctrl_c_closes_everything(
     assert family
     process.send_signal(signal.SIGINT)
     assert process.wait(20) == 0
-    assert process.stdout is not None
     rest = process.stdout.read()
     assert re.fullmatch(
         rf"For viewers, who change nothing: {re.escape(base)}/\?token=[\w-]{{43}}\nclosed\n", rest
@@ -93,7 +91,6 @@ def test_it_ends_whatever_a_thread_waits_for(tmp_path: Path) -> None:
     waiting += "Workspace.sessions = lambda self: threading.Event().wait()\n"
     process = started(tmp_path, waiting + SERVE)
     try:
-        assert process.stdout is not None
         printed = process.stdout.readline().removeprefix("Open ").strip()
         with httpx.Client(timeout=30.0, follow_redirects=True) as browser:
             browser.get(printed)
@@ -112,7 +109,6 @@ def test_the_token_is_printed_once_and_logged_nowhere(
 ) -> None:
     process, printed = served
     token = re.search(r"token=([\w-]+)", printed)
-    assert token is not None
     base = printed.partition("/?")[0]
     with httpx.Client(timeout=30.0) as browser:
         for path in (f"/?token={token[1]}", f"/api/none?token={token[1]}", f"/?token={token[1]}x", "/"):
@@ -120,7 +116,6 @@ def test_the_token_is_printed_once_and_logged_nowhere(
         browser.request("BREW", f"{base}/?token={token[1]}")
     process.send_signal(signal.SIGTERM)
     process.wait(20)
-    assert process.stdout is not None
     assert token[1] not in process.stdout.read()
     for path in tmp_path.rglob("*"):
         if path.is_file():

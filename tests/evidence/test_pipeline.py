@@ -165,7 +165,6 @@ def test_a_hull_is_carved_from_pixels_only_where_every_camera_has_an_empty_view(
     assert not maker(plates, background_model="knn").hull_of_pixels
     assert maker(slice(0, 4), hull_evidence="pixels").hull_of_pixels
     for view in maker(slice(0, 4), hull_evidence="pixels").evidence(9).views:
-        assert view.background is not None
         assert view.mask.max() == view.edges.max() == 0
         assert overlap(view.background.squared_distances(view.picture) > 60.0, true_mask(9)) > 0.8
     for view in maker(slice(0, 4)).evidence(9).views:

@@ -247,7 +247,6 @@ def server(place: Place) -> Iterator[Served]:
         text=True,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
     )
-    assert process.stdout is not None
     try:
         printed = process.stdout.readline() + process.stdout.readline()
         found = re.findall(r"(http://\S+)/\?token=(\S+)", printed)

@@ -58,7 +58,6 @@ def _reads(
     )
     said: queue.SimpleQueue[str] = queue.SimpleQueue()
     stream = process.stdout
-    assert stream is not None
 
     def listen() -> None:
         for line in stream:

@@ -129,7 +129,6 @@ def test_exports_open_in_other_readers(workflow: Workflow, tmp_path: Path) -> No
     count = len(studio.read_track(workflow.run, "smoothed").frames)
     with contextlib.redirect_stdout(io.StringIO()):
         read = bvhsdk.ReadFile(str(tmp_path / "man.bvh"))
-    assert read is not None
     assert read.frames == count
     markers = read_trc(tmp_path / "man.trc").positions
     assert markers.shape[0] == count

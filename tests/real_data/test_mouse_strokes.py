@@ -27,7 +27,6 @@ def mouse(real_data: Path, tmp_path: Path) -> Session:
 @pytest.mark.real_data
 def test_strokes_in_one_frame_cut_the_mouse_out_of_four_views(mouse: Session) -> None:
     made = set_up_background(mouse, "strokes", strokes=strokes_of_file(mouse, STROKES))
-    assert made.quality is not None
     for view in made.quality.views:
         print(f"{view.camera}: covered {view.covered:.3f}, inside {view.inside:.3f}")
         assert view.agreement >= 0.85, view.camera

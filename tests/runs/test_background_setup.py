@@ -121,7 +121,6 @@ def test_who_stood_in_a_plate_is_cleaned_away(session: Session, tmp_path: Path) 
     setup = set_up_background(changed, "combined", tune=False)
     now = Session(session.path)
     kept = cv2.imread(str(session.path / now.manifest.footage.cameras[0].background))
-    assert kept is not None
     wrong = np.abs(kept.astype(int) - empty(0)).max(axis=2) > 20
     assert wrong[30:110, 20:40].mean() < 0.05
     assert wrong.mean() < 0.04

@@ -81,7 +81,6 @@ def test_the_only_model_that_fits_is_used_and_reported(session_on_disk: Session,
     assert any("swings" in note for note in run.record.notes)
     assert (run.folder / BEHAVIOUR_NAME).read_bytes() == models.read_bytes()
     model = run.behaviour()
-    assert model is not None
     assert model.fps == FPS == run.record.fps
     assert prepare_run(session_on_disk).record.behaviour == ""
 
@@ -208,8 +207,6 @@ def test_frames_annealed_again_see_the_lessons_of_their_time(long_session: Sessi
                 question.step_layer()
             stored, again = results.result(frame), question.result()
             assert np.array_equal(again.estimate.pose, stored.estimate.pose)
-            assert again.carried.particles is not None
-            assert stored.carried.particles is not None
             assert np.array_equal(
                 again.carried.particles.extra[STATES], stored.carried.particles.extra[STATES]
             )

@@ -62,7 +62,6 @@ def test_the_outlines_lie_on_what_is_alike(alike: Session, tmp_path: Path) -> No
     found = contrast_of(alike, posed=True)
     for view in found.views:
         picture = cv2.imread(str(alike.path / "pictures" / view.camera / "0000.png"))
-        assert picture is not None
         inside = np.zeros((SIZE[1], SIZE[0]), np.uint8)
         cv2.fillPoly(inside, [np.array(outline, np.int32) for outline in view.outlines], (255,))
         # Redder than blue: wood, not cloth.

@@ -257,7 +257,6 @@ def test_a_finished_search_that_an_older_studio_saved_is_searched_again(session_
         tracking.save()
     with run.results() as results:
         partial = results.partial()
-        assert partial is not None
         assert (partial.frame, partial.next_layer) == (1, 2)
     assert np.array_equal(finish(session_on_disk, run), wanted)
 

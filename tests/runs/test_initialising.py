@@ -163,7 +163,6 @@ def test_a_drawn_body_without_feet_is_sought_with_feet() -> None:
     body = load_body("human31")
     space = search_space(body, default_sigma(body, 60.0))
     hull, box, note = hull_of(body, cameras, evidence)
-    assert hull is not None
     assert not note
     middle = hull.weights() @ hull.centres
     assert np.linalg.norm(middle[:2] - [200.0, 0.0]) < 60.0

@@ -31,7 +31,6 @@ def walk() -> tuple[BodyModel, tuple[Camera, ...], np.ndarray]:
     session = Session(WALK)
     body = session.body()
     start = session.start_pose(body)
-    assert start is not None
     turns = np.array([entry.kind == "angle" for entry in body.parameters])
     shifts = np.random.default_rng(0).uniform(-0.25, 0.25, (6, len(start))) * turns
     shifts[0] = 0.0

@@ -57,7 +57,6 @@ def _clip(name: str, folder: Path, kept: str) -> Session:
 def _stands(session: Session) -> tuple[float, float]:
     """x and y, metres, of the start pose."""
     start = session.start_pose()
-    assert start is not None
     x, y = limb_ends(session.body(), start[None])[0].reshape(-1, 3)[:, :2].mean(axis=0) / 1000.0
     return float(x), float(y)
 

@@ -40,7 +40,6 @@ def detection(camera: Camera, exchanged: bool = False, wrong: int | None = None)
 
 def found(seen: dict[str, Detection], before: Array | None = None) -> Array:
     joints = _joints({camera.name: camera for camera in CAMERAS}, seen, before)
-    assert joints is not None
     return joints[0]
 
 

@@ -53,7 +53,6 @@ def overlaps(ball: PatchedBall) -> dict[tuple[str, int], float]:
 def mask_files(session: Session) -> dict[str, bytes]:
     """The newest masks made of strokes, by camera and name."""
     made = made_of_strokes(Session(session.path))
-    assert made is not None
     return {
         f"{path.parent.name}/{path.name}": path.read_bytes() for path in sorted(made.place.glob("*/*.png"))
     }
@@ -63,7 +62,6 @@ def mask_files(session: Session) -> dict[str, bytes]:
 def test_strokes_in_one_frame_cut_the_subject_out_of_all(ball: PatchedBall, frame: int) -> None:
     made = set_up_background(ball.session, "strokes", strokes=ball.strokes(frame))
     assert made.knobs == {"background_model": "auto"}
-    assert made.quality is not None
     assert all(view.agreement > 0.85 for view in made.quality.views)
     found = overlaps(ball)
     assert len(found) == 3 * FRAMES
@@ -213,7 +211,6 @@ def test_the_preview_is_the_mask_that_is_made(ball: PatchedBall) -> None:
     more = Stroke(camera="cam1", frame=3, kind="outside", width=r, points=((x, y - r), (x, y - r)))
     changed = preview_mask(now, "cam1", 3, (*strokes, more))
     footage.close()
-    assert changed is not None
     assert not changed[int(y - r) : int(y - 0.7 * r), int(x)].any()
     assert overlap(changed, ball.masks["cam1", 3]) > 0.6
 

@@ -43,7 +43,6 @@ def test_it_follows_the_arm_and_records_every_layer(session_on_disk: Session) ->
         assert [len(results.layers(frame)) for frame in range(5)] == [16, 8, 8, 8, 8]
         assert [record.layer for record in results.layers(0)] == list(range(16))
         carried = results.result(2).carried.particles
-        assert carried is not None
         assert carried.poses.shape == (150, 4)
         assert np.array_equal(carried.poses, results.layer(2, 7).poses)
         assert results.timeline().evaluations.tolist() == [2400, 1200, 1200, 1200, 1200]
@@ -214,7 +213,6 @@ def test_fewer_particles_recorded_change_no_pose(session_on_disk: Session) -> No
     with few.results() as results:
         assert len(results.layer(3, 0).poses) == 5
         carried = results.result(3).carried.particles
-        assert carried is not None
         assert len(carried.poses) == 40
 
 

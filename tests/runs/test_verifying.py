@@ -42,7 +42,6 @@ def content(run: StoredRun) -> list[bytes]:
         found = [results.poses()[1].tobytes()]
         for frame in results.frames():
             particles = results.result(frame).carried.particles
-            assert particles is not None
             found += [particles.poses.tobytes(), particles.log_weights.tobytes()]
             found += [record.poses.tobytes() for record in results.layers(frame)]
     return found

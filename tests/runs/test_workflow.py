@@ -71,7 +71,6 @@ def test_a_cancelled_run_does_not_hide_the_whole_one(session_on_disk: Session) -
     with ResultsWriter(later.folder) as writer:
         writer.mark_ended("cancelled")
     used = run_to_use(session_on_disk)
-    assert used is not None
     assert used.name == "whole"
     assert (step("track"), step("check"), step("export")) == (
         ("done", "whole"),

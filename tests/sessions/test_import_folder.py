@@ -43,14 +43,12 @@ def test_every_optional_part_arrives(tmp_path: Path) -> None:
     session = import_source(full_source(tmp_path / "source"), tmp_path / "made").session
     footage = session.footage()
     mask = footage.mask("cam_2", 3)
-    assert mask is not None
     assert mask[50, 50] == 255
     assert mask[5, 5] == 0
     assert footage.background_path("cam_1") == session.path / "background" / "cam_1.png"
     assert session.truth_path is not None
     assert read_trc(session.truth_path).names == ("Hip", "Neck")
     subject = session.subject()
-    assert subject is not None
     assert subject.lengths_mm == {"RHip_RKnee": 420}
     start = session.start_pose()
     assert start is not None

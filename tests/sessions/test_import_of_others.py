@@ -246,7 +246,6 @@ def test_windows_editors(tmp_path: Path, encoding: str) -> None:
     ):
         path.write_text(text, encoding=encoding)
     subject = imported(source).session.subject()
-    assert subject is not None
     assert subject.height_mm == 1780
 
 

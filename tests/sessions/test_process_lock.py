@@ -33,7 +33,6 @@ def held_by_another(path: Path) -> Iterator[subprocess.Popen[str]]:
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )
     with process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "held\n"
         try:
             yield process
@@ -51,7 +50,6 @@ def test_another_process_holds_it_until_it_dies(tmp_path: Path) -> None:
         process.wait()
         assert not ProcessLock.is_held(path)
         lock = ProcessLock.take(path)
-        assert lock is not None
         assert ProcessLock.is_held(path)
         lock.free()
     assert not ProcessLock.is_held(path)

@@ -106,7 +106,6 @@ def _drawn(browser: Browser, studio: StudioServer, particles: int, seconds: floa
         window.page.wait_for_timeout(1e3 * SETTLE_SECONDS)
         drawing = Drawing(window)
         box = window.page.locator("#scene").bounding_box()
-        assert box is not None
         across, down = box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"]
         window.page.mouse.move(across, down)
         window.page.mouse.down()

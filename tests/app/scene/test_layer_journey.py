@@ -173,7 +173,6 @@ def test_the_particle_under_the_pointer_is_named_with_its_line(
     eye = framed(places.reshape(-1, 3), np.array([1.0, 0.3, 0.2]), *LENS)
     across, down, _ = on_screen(places[4, :1], eye, *LENS)[0]
     found = search.pointed((float(across), float(down)), eye, LENS, 0.05)
-    assert found is not None
     assert (found.layer, found.particle, found.particles) == (3, 4, PARTICLES)
     assert found.line == (0, 0, 0, 4)
     assert found.log_weight == records[3].log_weights[4]

@@ -60,7 +60,6 @@ def live_after(*events: LayerFinished | FrameFinished) -> LiveSearch:
 
 
 def knob(model: Model, name: str = "survival") -> object:
-    assert model.knobs is not None
     return model.knobs.shown[name]
 
 
@@ -129,7 +128,6 @@ def test_options_change_one_by_one(shown: Model) -> None:
     added = scene.tick_listed(light, "overlays", "mask", True)
     assert added.options.overlays == ("outline", "mask")
     assert scene.tick_listed(added, "overlays", "outline", False).options.overlays == ("mask",)
-    assert shown.subject is not None
     tips = shown.subject.listed("limbs", light.options)
     fewer = scene.tick_listed(light, "limbs", "head", False)
     assert fewer.options.limbs == tuple(name for name in tips if name != "head")
@@ -266,7 +264,6 @@ def test_layers_collect_until_another_search_begins(human: BodyModel) -> None:
 def test_a_result_keeps_the_layers_it_came_from(human: BodyModel) -> None:
     done = live_after(layer(human, 3, 0), finished(human, 3, shift=50.0))
     assert len(done.records) == 1
-    assert done.pose is not None
     assert done.pose[4] == swaying_pose(human, 3)[4] + 50.0
     assert live_after(layer(human, 2, 0), finished(human, 3)).records == ()
     whole = live_after(*(layer(human, 3, number) for number in range(LAYERS)), finished(human, 3))
@@ -339,12 +336,10 @@ def test_half_written_text_stays_until_settings_are_applied(shown: Model) -> Non
 
 def test_what_is_in_use_and_since_when(shown: Model) -> None:
     applied = after(shown, SettingsApplied("s", "r", 2, 128, 2, {"survival": 0.7}, ("survival",)))
-    assert applied.knobs is not None
     assert applied.knobs.since == (128, 2)
     assert knob(applied) == 0.7
     other = scene.request(applied, "one", {"survival": 0.2})
     again = scene.opened(other, "s", "q", shown.subject, (), default_settings())
-    assert again.knobs is not None
     assert again.knobs.since is None
     assert knob(again) == knob(shown), "what was requested was about the run before"
     assert "one" in again.knobs.requested, "its refusal is reported anyway"

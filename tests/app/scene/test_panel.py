@@ -190,7 +190,6 @@ def test_a_slider_requests_and_a_changed_value_is_marked(settings: Settings) -> 
 
 def test_presets_and_resets_are_one_request(settings: Settings) -> None:
     careful = next(preset for preset in presets() if preset.name == "careful")
-    assert settings.panel.preset is not None
     by_hand(settings.panel.preset.handle, "careful")
     settings.posted.happen()
     assert settings.requests == [dict(careful.values)]
@@ -291,7 +290,6 @@ def test_the_pose_tab_shows_degrees_and_requests_radians(
     by_hand(panel.sliders[9].handle, -30.0)
     by_hand(panel.grip.handle, "left forearm")
     edit = posted.happen().edit
-    assert edit is not None
     assert (edit.active, edit.grip, edit.pose[9]) == (
         True,
         "left forearm",
@@ -310,7 +308,6 @@ def test_the_pose_tab_shows_degrees_and_requests_radians(
     by_hand(panel.grip.handle, "none")
     press(panel.back, "undo")
     edit = posted.happen().edit
-    assert edit is not None
     assert (edit.grip, edit.pose[9]) == ("", pytest.approx(math.radians(-30.0)))
 
 

@@ -91,7 +91,6 @@ def test_a_drag_is_one_change_and_moves_limb_or_root(human: BodyModel) -> None:
         assert entry.lower <= value <= entry.upper
     np.testing.assert_array_equal(undone(edit).pose, pose)
     root = dragger.root_frame(pose)
-    assert root is not None
     wxyz = pose_edit.Rotation.from_matrix(root[:, :3]).as_quat(scalar_first=True)
     carried = pose_edit.dragged(
         pose_edit.edit_of(pose), dragger, "", root[:, 3] + [100.0, -50.0, 20.0], wxyz, is_last=True

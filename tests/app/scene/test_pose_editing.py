@@ -94,7 +94,6 @@ def test_a_dragged_ball_takes_the_limb_along_and_only_the_newest_place_counts(
     gate, solved = threading.Event(), []
     stage._controller.post(lambda model: (gate.wait(5.0), model)[1])
     subject = stage._controller.model.subject
-    assert subject is not None
     plain = subject.dragger.dragged
     cast("Any", subject.dragger).dragged = lambda *given: solved.append(given[2]) or plain(*given)
     for step in range(1, 9):
@@ -129,19 +128,16 @@ def test_a_frame_is_corrected_from_the_pose_that_is_shown_there(stage: SceneServ
     stage.poses.edit("swaying", "run-1", 2)
     until(lambda: stage.shown.editing and stage.shown.frame == 2)
     editing = stage.poses.editing
-    assert editing is not None
     assert (editing.session, editing.run, editing.frame, editing.moved) == ("swaying", "run-1", 2, False)
     assert pose_is(stage, swaying_pose(human, 2))
     wanted = swaying_pose(human, 3)
     stage.poses.edit("swaying", "run-1", 2, wanted.tolist())
     until(lambda: pose_is(stage, wanted))
-    assert stage.poses.editing is not None
     assert stage.poses.editing.moved
     stage.poses.leave()
     until(lambda: not stage.shown.editing)
     stage.poses.edit("swaying")
     until(lambda: stage.poses.editing is not None and stage.poses.editing.frame is None)
-    assert stage.poses.editing is not None
     assert stage.poses.editing.run == ""
 
 

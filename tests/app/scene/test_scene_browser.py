@@ -67,7 +67,6 @@ def page(browser: Browser) -> Iterator[Page]:
 def colours_of(path: Path) -> np.ndarray:
     """The scene's part of a screenshot, RGB."""
     picture = cv2.imread(str(path))
-    assert picture is not None
     return picture[160:, :900, ::-1].astype(int)
 
 

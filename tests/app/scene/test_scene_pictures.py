@@ -86,7 +86,6 @@ def test_a_picture_is_twice_the_window_with_its_caption_below(
     caption = made[362:]
     assert (np.abs(caption[..., :3].astype(int) - DARK["text"]).sum(axis=-1) < 30).sum() > 50
     read = cv2.imdecode(np.frombuffer(png_of(made), np.uint8), cv2.IMREAD_UNCHANGED)
-    assert read is not None
     assert tuple(read[0, 0]) == (30, 90, 10, 255)
     clear = pictures.take(1.0, transparent=True)
     assert clear[170, 5, 3] == clear[-1, -1, 3] == 0

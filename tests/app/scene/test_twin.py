@@ -57,7 +57,6 @@ def split(scenes: WindowScenes) -> tuple[SceneServer, SceneServer]:
     until(lambda: stored.shown.frame == FRAME)
     scenes.split("w", True)
     tried = scenes.twin("w")
-    assert tried is not None
     until(lambda: tried.shown.frame == FRAME)
     return stored, tried
 
@@ -104,7 +103,6 @@ def test_a_trial_that_is_shown_while_the_first_scene_is_busy_is_kept(
     stored._controller.post(hold)
     scenes.split("w", True)
     tried = scenes.twin("w")
-    assert tried is not None
     trial = frame_result(human, FRAME, shift=SHIFT)
     tried.show_trial(LiveSearch(FRAME, True, (cloud_record(human, FRAME, 0),), trial))
     goes_on.set()

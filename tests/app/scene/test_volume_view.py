@@ -79,9 +79,6 @@ def test_what_is_drawn_already_is_not_sent_again(server: GuardedServer, human: B
     first, then = swaying_pose(human, 0), swaying_pose(human, 3)
     volume = FrameVolume(0, some_hull(40), model, model.mixture(human, first[None]).at(0))
     view.show(volume, first, TOKENS, hull=True, blobs=True)
-    assert view.voxels.handle is not None
-    assert view.fitted.handle is not None
-    assert view.own.handle is not None
     np.testing.assert_allclose(view.own.handle.batched_positions, view.fitted.handle.batched_positions)
     buffer = server._websock_server._broadcast_buffer
     before = buffer.message_counter
@@ -136,7 +133,6 @@ def test_a_run_weighed_by_blobs_shows_its_own_hull_and_fit(session_on_disk: Sess
     made = Made(OpenedRun(session_on_disk, run))
     assert made.of(2, blobs=False) is not None
     volume = made.of(3, blobs=True)
-    assert volume is not None
     with run.results() as results:
         before, answer = results.result(2), results.result(3)
     source = ProblemSource(session_on_disk, run.body(), run.cameras())
@@ -144,9 +140,6 @@ def test_a_run_weighed_by_blobs_shows_its_own_hull_and_fit(session_on_disk: Sess
     assert isinstance(problem, BlobFrameLikelihood)
     np.testing.assert_array_equal(volume.hull.centres, problem.hull.centres)
     expected = problem.expecting(answer.estimate.pose[None], before.carried.memory)
-    assert expected.fitted is not None
-    assert volume.fitted is not None
-    assert volume.model is not None
     np.testing.assert_array_equal(volume.fitted.means, expected.fitted.mixture.means)
     assert np.isfinite(volume.model.colour).any(), "the blobs that the run has learnt, not the cones'"
     source.close()
@@ -157,7 +150,6 @@ def test_every_other_run_shows_a_hull_and_no_blobs(session_on_disk: Session) -> 
     run = tracked(session_on_disk, "edge-region")
     made = Made(OpenedRun(session_on_disk, run))
     volume = made.of(1, blobs=True)
-    assert volume is not None
     assert not volume.hull.empty
     assert volume.model is None
     assert volume.fitted is None

@@ -153,7 +153,6 @@ def test_strokes_are_painted_tried_kept_and_carried(studio: Studio) -> None:
     shown = studio.client.post(f"{place}/cam1/preview", json={"frame": 2, "strokes": strokes})
     assert shown.headers["content-type"] == "image/png"
     picture = cv2.imdecode(np.frombuffer(shown.content, np.uint8), cv2.IMREAD_UNCHANGED)
-    assert picture is not None
     assert picture.shape == (*true.shape, 4)
     assert overlap(picture[..., 3], true) > 0.9
     wrong = [*strokes, {"frame": 99, "kind": "inside", "width": 1, "points": [[5, 5]]}]

@@ -94,7 +94,6 @@ def test_the_second_scene_shows_the_trial(studio: Studio, tracked: StoredRun) ->
     show(twin=True, trial=trial, against="")
     assert own[-2:] == [("split", True), ("trial", None, 0)]
     twin = studio.scenes.twin("w")
-    assert twin is not None
     assert twin.calls == [("trial", 1, LAYERS)]
     show(against=trial)
     assert own[-1] == ("trial", 1, LAYERS)

@@ -97,7 +97,6 @@ def test_how_far_a_named_axis_is_off_is_said() -> None:
 def test_the_vertical_of_level_pictures_is_exact() -> None:
     turn = cv2.Rodrigues(np.array([0.3, -0.2, 0.5]))[0]
     found = common_vertical(in_world(phones((0.0, 0.0, 0.0, 0.0)), turn))
-    assert found is not None
     assert found.level
     np.testing.assert_allclose(found.up, turn @ [0.0, 0.0, 1.0], atol=1e-9)
 

@@ -46,7 +46,6 @@ def test_a_centred_crop_moves_the_principal_point() -> None:
     camera, crop = fit_camera(CAMERA, 1080, 1920, black_margins(lambda _: cropped, 1))
     (moved,), _ = project(camera, POINT)
     np.testing.assert_allclose(moved, centre_of(cropped), atol=0.05)
-    assert crop is not None
     assert (crop.left, crop.right, crop.top, crop.scale) == (4.0, 4.0, 0.0, 1.0)
     assert camera.matrix[0, 2] == CAMERA.matrix[0, 2] - 4.0
     assert "4 px at the left" in crop.words("c")
@@ -61,7 +60,6 @@ def test_a_picture_shrunk_between_bars_is_scaled() -> None:
     camera, crop = fit_camera(CAMERA, 1080, 1920, bars)
     (moved,), _ = project(camera, POINT)
     np.testing.assert_allclose(moved, centre_of(footage), atol=0.1)
-    assert crop is not None
     assert crop.scale == pytest.approx(1080 / 1088)
 
 

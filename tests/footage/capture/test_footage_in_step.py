@@ -39,7 +39,6 @@ def test_frames_are_counted_from_each_cameras_offset(tmp_path: Path) -> None:
     for frame in (0, 22, 5, 6, 21):
         assert [number_of(picture) for picture in footage.pictures(frame).pictures] == [frame, frame + 7]
         masks = footage.masks(frame)
-        assert masks is not None
         assert bool(masks["b"].all()) == (frame + 7 >= 13)
     with pytest.raises(NotFoundError, match="no frame 23"):
         footage.picture("a", 23)
@@ -59,7 +58,6 @@ def test_pictures_and_masks_are_turned_clockwise(tmp_path: Path, turned: Turn) -
         picture = footage.picture("b", frame)
         np.testing.assert_array_equal(picture, numbered_frame(frame + 2))
         mask = footage.mask("b", frame)
-        assert mask is not None
         assert mask.shape == (HEIGHT, WIDTH)
     plate = numbered_frame(40)
     lying = cv2.rotate(plate, OPENCV_TURNS[360 - turned])

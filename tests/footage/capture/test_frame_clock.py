@@ -38,12 +38,10 @@ def test_frames_come_at_their_times_and_the_newest_is_given(hours: Hours) -> Non
     assert clock.newest(-1) is None, "nothing comes before it begins"
     clock.begin(2)
     first = clock.newest(1)
-    assert first is not None
     assert (first.frame, first.times, first.complete) == (2, (5.0, 5.0, 5.0), 5.0)
     assert clock.newest(2) is None
     hours.now += 0.26
     newest = clock.newest(2)
-    assert newest is not None
     assert newest.frame == 7, "five frames of 50 ms passed"
     assert newest.complete == pytest.approx(5.25)
 
@@ -58,7 +56,6 @@ def test_waiting_sleeps_until_the_next_frame_is_due_but_never_long(hours: Hours)
     clock.wait(0)
     assert hours.slept[1:] == [pytest.approx(0.03)]
     found = clock.newest(0)
-    assert found is not None
     assert found.frame == 1, "it is there at its very moment"
     clock.wait(0)
     assert len(hours.slept) == 2, "what is there is not waited for"
@@ -69,7 +66,6 @@ def test_it_is_over_after_the_last_frame(hours: Hours) -> None:
     clock.begin(0)
     hours.now += 60.0
     newest = clock.newest(-1)
-    assert newest is not None
     assert newest.frame == 3
     assert not clock.over(2)
     assert clock.over(3)

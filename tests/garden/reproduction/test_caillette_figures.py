@@ -196,10 +196,8 @@ def test_the_printed_tracker_is_the_papers() -> None:
     assert (wanted.model_free_share, wanted.model_free_grows, wanted.entering) == (0.0, False, "resample")
     assert wanted.estimate == "mode"
     trained = setting.training_for(one, 20, quick=False)
-    assert trained is not None
     assert trained.settings().back_off == 0.0
     ours = setting.training_for(setting.guided(200), 20, quick=False)
-    assert ours is not None
     assert ours.settings().back_off > 0.0
     assert setting.training_for(setting.ANNEALED, 20, quick=False) is None
 

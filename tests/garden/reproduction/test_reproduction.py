@@ -216,7 +216,6 @@ def test_folders_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
             run([], tmp_path / name)
     (tmp_path / "busy").mkdir()
     lock = ProcessLock.take(tmp_path / "busy" / LOCK)
-    assert lock is not None
     with pytest.raises(RunError, match="Another process"):
         run([], tmp_path / "busy")
     lock.free()

@@ -333,7 +333,6 @@ def test_closing_saves_the_frame_at_hand_and_stops_the_process(
     assert watching.closed
     with run.results() as results:
         partial = results.partial()
-    assert partial is not None
     assert partial.next_layer >= 1
     assert len(partial.state["set_poses"]) == 4000
 
@@ -357,7 +356,6 @@ def test_the_process_ends_when_the_server_is_killed(session_on_disk: Session) ->
         """
     )
     server = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
-    assert server.stdout is not None
     process = psutil.Process(int(server.stdout.readline()))
     server.kill()
     server.wait()

@@ -131,7 +131,6 @@ def test_a_killed_recorder_leaves_a_take_that_can_be_finished(base: Session, tmp
         writer.put(frame, a_set(10.0 + frame / 25.0))
     follower = SetFollower(take.path)
     found = follower.newest(-1)
-    assert found is not None
     assert (found.frame, found.times) == (4, (10.16,))
     # What a kill leaves: no last line, a picture that no line tells of, half a line.
     (take.path / "pictures" / "front" / "000005.jpg").write_bytes(b"\xff\xd8")

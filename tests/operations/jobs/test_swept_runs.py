@@ -62,7 +62,6 @@ def test_runs_are_kept_and_a_broken_sweep_goes_on(walk: Session) -> None:
         with run.results() as results:
             assert len(results.layers(1)) == 2
             taken = results.time_taken()
-            assert taken is not None
             assert taken.frames == 3
             assert taken.seconds >= results.timeline().milliseconds.sum() / 1000.0
     assert walk.run("sweep-1-p2-s1").record.settings["survival"] == 0.5

@@ -87,7 +87,6 @@ def test_a_full_disk_fails_the_frame_and_start_goes_on(
     harness.open(run)
     harness.ask(commands.Start())
     harness.advance(LAYERS)
-    assert harness.job._run is not None
     fault = break_at(harness.job._run.tracking._writer, 3, ROLLED_BACK)
 
     def refuse(*_: object) -> None:
@@ -206,7 +205,6 @@ def test_a_layers_step_stops_in_the_frame_and_the_next_goes_on_from_its_particle
         with run.results() as results:
             partial = results.partial()
             assert [record.layer for record in results.layers(0)] == list(range(done))
-        assert partial is not None
         assert partial.next_layer == done
         waiting = partial.state["set_poses"]
     harness.ask(commands.Start())
@@ -524,7 +522,6 @@ def test_another_run_opened_while_tracking_leaves_the_first_saved_whole(
     assert (harness.state.run, harness.state.state) == ("b", "paused")
     with run.results() as results:
         partial = results.partial()
-    assert partial is not None
     assert (partial.frame, partial.next_layer) == (1, 2)
     harness.open(run)
     harness.ask(commands.Start())
@@ -570,7 +567,6 @@ def test_closing_a_run_lets_go_of_its_pictures(harness: Harness, run: StoredRun,
     harness.ask(commands.Start())
     harness.advance(2)
     opened = harness.job._run
-    assert opened is not None
     make_session(Workspace().root / "other")
     harness.open(new_run(Workspace().session("other"), "x"))
     assert not opened._problems._evidence

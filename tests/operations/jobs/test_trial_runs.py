@@ -59,7 +59,6 @@ def test_the_run_of_a_trial_has_its_errors(
     run = run_of_trial(walk, kept, tracker, seed)
     finish(walk, run)
     result = kept.result()
-    assert result is not None
     wanted = result["per_frame"]["error_mm"][tracker][[3, 4].index(seed)]
     found = errors_of(walk, run)
     assert [found[frame] for frame in range(FIRST, LAST)] == pytest.approx(wanted, abs=2e-3)

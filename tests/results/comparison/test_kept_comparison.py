@@ -84,7 +84,6 @@ def test_a_finished_one_has_numbers_findings_and_frames(kept: KeptComparison) ->
     kept.finish(conclude(drawn, made_up(drawn)))
     assert kept.status() == "done"
     result = kept.result()
-    assert result is not None
     assert [entry["tracker"] for entry in result["trackers"]] == ["annealed", "condensation"]
     assert result["findings"]["verdict"] == "answered"
     assert len(result["per_frame"]["error_mm"]["annealed"]) == 3
@@ -95,7 +94,6 @@ def test_a_finished_one_has_numbers_findings_and_frames(kept: KeptComparison) ->
 def test_the_same_request_resumes_an_unfinished_comparison(walk: Session, kept: KeptComparison) -> None:
     again = kept.plan(walk)
     found = unfinished_like(walk, again)
-    assert found is not None
     assert found.folder == kept.folder
     kept.finish(conclude(again, made_up(again)))
     assert unfinished_like(walk, again) is None
@@ -114,7 +112,6 @@ def test_differences_are_named(kept: KeptComparison) -> None:
 
 def test_only_one_process_works_on_it(walk: Session, kept: KeptComparison) -> None:
     lock = ProcessLock.take(kept.folder / LOCK_NAME)
-    assert lock is not None
     assert kept.status() == "running"
     assert kept.lock() is None
     with pytest.raises(SessionError, match="running"):

@@ -166,7 +166,6 @@ def test_a_sweep_is_kept_as_a_comparison_is(tmp_path: Path) -> None:
     kept.finish(conclude_sweep(drawn, made_up(drawn)))
     result = KeptComparison(kept.folder).result()
     assert kept.status() == "done"
-    assert result is not None
     assert result["vary"] == {"survival": [0.2, 0.5], "particles": [20, 40, 60]}
 
 

@@ -82,7 +82,6 @@ def test_masks_and_markers_are_where_the_true_poses_put_the_body(tmp_path: Path,
     order = [[marker.name for marker in body.markers].index(one) for one in truth.names]
     np.testing.assert_allclose(truth.positions, marker_points(body, poses)[:, order], atol=0.01)
     start = session.start_pose()
-    assert start is not None
     assert 0.0 < degrees_off(session, start[None]).max() < 8.0
     footage, ends = session.footage(), limb_ends(body, poses)
     try:
@@ -124,7 +123,6 @@ def test_flat_ends_are_those_of_the_tree(tmp_path: Path) -> None:
     try:
         for camera in session.cameras():
             mask, drawn = footage.mask(camera.name, 0), drawn_mask(session.body(), pose, camera)
-            assert mask is not None
             wrong = cv2.morphologyEx(mask ^ drawn, cv2.MORPH_OPEN, np.ones((4, 4), np.uint8))
             assert not wrong.any()
     finally:

@@ -33,7 +33,6 @@ def test_a_rendered_motion_becomes_a_session_whose_start_pose_meets_the_truth(
     assert session.truth_path is not None
     truth = read_trc(session.truth_path)
     body, pose = session.body(), session.start_pose()
-    assert pose is not None
     found = evaluate(pose[None], np.array([0]), body, truth, 60.0)
     assert found.mean_mm < 8.0
     assert found.unmatched_markers == ()
@@ -84,7 +83,6 @@ def test_a_session_has_what_its_recipe_includes_and_the_start_pose_its_error(tmp
         assert (made.manifest.title, made.manifest.imported_from) == ("One", "recipe stand.toml")
         assert made.subject().lengths_mm
         body, pose = made.body(), made.start_pose()
-        assert pose is not None
         assert made.truth_path is not None
         truth = read_trc(made.truth_path)
         errors.append(evaluate(pose[None], np.array([0]), body, truth, made.manifest.fps).mean_mm)
@@ -127,14 +125,12 @@ def test_arms_are_their_own_body_with_exact_masks(tmp_path: Path, name: str) -> 
     body = session.body()
     assert body.name == session.manifest.body
     truth = read_trc(session.truth_path) if session.truth_path else None
-    assert truth is not None
     assert set(truth.names) == {marker.name for marker in body.markers}
     camera = session.cameras()[0]
     footage = session.footage()
     try:
         for frame in range(4):
             mask = footage.mask(camera.name, frame)
-            assert mask is not None
             pixels = np.rint(project(camera, truth.positions[frame])[0]).astype(int)
             for at, other in [(0, 1), (1, 2), (2, 3)]:
                 middle = (pixels[at] + pixels[other]) // 2

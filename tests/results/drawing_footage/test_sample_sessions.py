@@ -64,7 +64,6 @@ def test_the_walk_is_as_long_and_seen_as_it_should_be() -> None:
         tall = np.ptp(pixels[:, :, 1], axis=1)
         assert tall.min() > 100.0
     body, pose = session.body(), session.start_pose()
-    assert pose is not None
     start = evaluate(pose[None], np.array([0]), body, truth, 60.0)
     assert 0.1 < start.mean_mm < 6.0
 

@@ -27,7 +27,6 @@ from studio.results.drawing_footage.recipes import synthesize
 from studio.sessions.session import Session
 
 BODY = load_body("human31")
-assert BODY.definition is not None
 ORDER = BODY.definition.shape_order
 
 
@@ -132,7 +131,6 @@ def test_a_recipe_may_name_shape_and_sigma(tmp_path: Path, shape_file: Path) -> 
     assert len(body.drawn) == len(of_shape.drawn) + 4
     assert session.truth_path is not None
     pose, truth = session.start_pose(), read_trc(session.truth_path)
-    assert pose is not None
     again, error = pose_from_markers(body, truth.names, truth.positions[0], pose)
     assert error < 1e-3
     assert again.shape == pose.shape

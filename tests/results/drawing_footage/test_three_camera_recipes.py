@@ -159,7 +159,6 @@ def test_a_few_small_frames_become_a_session(tmp_path: Path, name: str) -> None:
     assert session.manifest.body == entries.get("body", "human31")
     assert session.truth_path is not None
     body, pose = session.body(), session.start_pose()
-    assert pose is not None
     found = evaluate(pose[None], np.array([0]), body, read_trc(session.truth_path), 60.0)
     assert found.mean_mm < 12.0
     sigma = session.sigma()

@@ -35,7 +35,6 @@ def test_a_turned_camera_is_a_wrong_calibration_by_so_many_pixels(
 ) -> None:
     cameras = (*CAMERAS[:2], turned_camera(CAMERAS[2], pixels, direction), CAMERAS[3])
     found = fault_of(view_fits(BODY, cameras, evidence, BODY.neutral))
-    assert found is not None
     assert (found.kind, found.fit.camera) == ("calibration", "cam3")
     assert found.fit.distance == pytest.approx(pixels, abs=5.0)
 
@@ -46,13 +45,11 @@ def test_cut_masks_are_bad_masks(evidence: FrameEvidence) -> None:
         dataclasses.replace(view, mask=damage(0, view.camera, view.mask)) for view in evidence.views
     )
     found = fault_of(view_fits(BODY, CAMERAS, FrameEvidence(0, views), BODY.neutral))
-    assert found is not None
     assert (found.kind, found.fit.camera) == ("masks", "cam2")
     empty = tuple(
         dataclasses.replace(view, mask=view.mask * (view.camera != "cam4")) for view in evidence.views
     )
     found = fault_of(view_fits(BODY, CAMERAS, FrameEvidence(0, empty), BODY.neutral))
-    assert found is not None
     assert (found.kind, found.fit.camera, found.fit.best) == ("masks", "cam4", 0.0)
 
 

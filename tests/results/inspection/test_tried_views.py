@@ -115,7 +115,6 @@ def test_errors_and_spread_are_those_of_the_trial_in_its_frame(
     search: Reannealing, run: InspectedRun, tried: InspectedRun
 ) -> None:
     truth = true_points(run, FRAME)
-    assert truth is not None
     away = np.linalg.norm(body_points(run.body, search.result().estimate.pose[None])[0] - truth, axis=1)
     names = [marker.name for marker in run.body.markers]
     own = [names.index(name) for name in ("LHip", "LKnee", "LAnkle")]

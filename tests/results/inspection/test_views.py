@@ -54,9 +54,7 @@ def test_every_table_is_as_the_registry_says(run: InspectedRun, name: str) -> No
 
 
 def test_the_last_layers_weights_are_those_that_the_search_ended_with(frame: InspectedFrame) -> None:
-    assert frame.result is not None
     particles = frame.result.carried.particles
-    assert particles is not None
     assert np.allclose(frame.log_weights(LAYERS - 1), particles.log_weights, atol=1e-12)
 
 
@@ -186,7 +184,6 @@ def test_the_landscape_is_the_likelihood(run: InspectedRun, frame: InspectedFram
 
 def test_a_way_leads_from_the_estimate_to_the_truth(run: InspectedRun, frame: InspectedFrame) -> None:
     truth = true_pose(run, 3)
-    assert truth is not None
     line = line_of(frame, Selection(towards="truth"))
     at = {round(float(place), 6): pose for place, pose in zip(line.places, line.poses, strict=True)}
     assert np.allclose(at[0.0], frame.estimate())
@@ -224,7 +221,6 @@ def test_pulls_are_the_likelihoods_slopes(run: InspectedRun, frame: InspectedFra
 
 def test_two_answers_are_two_modes_and_a_wide_cloud_is_one(run: InspectedRun) -> None:
     rng, body, truth = np.random.default_rng(5), run.body, true_pose(run, 3)
-    assert truth is not None
     legs = next(kind for kind in kinds_of(body) if "leg" in kind.what)
     small = 0.02 * np.array([entry.kind == "angle" for entry in body.parameters])
     both = np.concatenate(
@@ -242,7 +238,6 @@ def test_two_answers_are_two_modes_and_a_wide_cloud_is_one(run: InspectedRun) ->
 def test_coverage_ranks_the_truth_in_the_stored_set(run: InspectedRun, frame: InspectedFrame) -> None:
     viewed = look_over(run, "coverage", NOTHING)
     truth = true_points(run, 3)
-    assert truth is not None
     points, weights = marker_points(run.body, frame.layers[-1].poses), frame.weights(LAYERS - 1)
     names = [marker.name for marker in run.body.markers]
     own = [names.index(name) for name in ("LHip", "LKnee", "LAnkle")]
@@ -256,7 +251,6 @@ def test_coverage_ranks_the_truth_in_the_stored_set(run: InspectedRun, frame: In
     ranks: list[float] = []
     for number in run.frames():
         other, goal = run.frame(number), true_points(run, number)
-        assert goal is not None
         below = marker_points(run.body, other.layers[-1].poses)[:, own] < goal[own]
         ranks += [
             min(float(other.weights(LAYERS - 1) @ column), 1.0) for column in below.reshape(PARTICLES, -1).T

@@ -32,7 +32,6 @@ def wandering(body: BodyModel, frames: int, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     poses = np.tile(body.neutral, (frames, 1))
     root = root_frame(body)
-    assert root is not None
     for column in root.columns:
         size = 20.0 if body.parameters[column].kind == "length" else 0.4
         poses[:, column] += np.cumsum(rng.normal(scale=size, size=frames))
@@ -42,7 +41,6 @@ def wandering(body: BodyModel, frames: int, seed: int) -> np.ndarray:
 def turned(body: BodyModel, poses: np.ndarray, angle: float) -> np.ndarray:
     """The same recording seen by an observer turned by `angle` (rad)."""
     root = root_frame(body)
-    assert root is not None
     found, level = poses.copy(), root.columns[root.level]
     found[:, root.heading] += angle
     found[:, level] = Rotation.from_euler("z", angle).apply(np.c_[poses[:, level], np.zeros(len(poses))])[
@@ -80,7 +78,6 @@ def model() -> BehaviourModel:
 def test_adding_a_change_gives_the_next_frame(name: str) -> None:
     body = load_body(name)
     poses, root = wandering(body, 60, 1), root_frame(body)
-    assert root is not None
     again = root.moved(poses[:-1], root.changes(poses)[1:])
     np.testing.assert_allclose(again, poses[1:], atol=1e-9)
 
@@ -88,7 +85,6 @@ def test_adding_a_change_gives_the_next_frame(name: str) -> None:
 def test_the_first_frame_has_the_seconds_change_and_angles_go_the_short_way() -> None:
     body = load_body("human25")
     root = root_frame(body)
-    assert root is not None
     poses = np.tile(body.neutral, (3, 1))
     poses[:, root.heading] = [3.1, -3.1, -3.0]
     changes = root.changes(poses)
@@ -102,7 +98,6 @@ def test_the_first_frame_has_the_seconds_change_and_angles_go_the_short_way() ->
 def test_changes_do_not_depend_on_the_heading(name: str, angle: float) -> None:
     body = load_body(name)
     poses, root = wandering(body, 50, 2), root_frame(body)
-    assert root is not None
     other = turned(body, poses, angle)
     assert np.abs(other - poses).max() > 0.5
     np.testing.assert_allclose(root.changes(other), root.changes(poses), atol=1e-9)
@@ -161,12 +156,9 @@ def test_particles_move_as_their_clusters_with_its_covariance() -> None:
 
 def test_another_rate_scales_the_changes_of_a_frame(model: BehaviourModel) -> None:
     fast = model.at_rate(2.0 * FPS)
-    assert model.root is not None
-    assert fast.root is not None
     np.testing.assert_allclose(fast.root.changes.means, 0.5 * model.root.changes.means)
     np.testing.assert_allclose(fast.root.changes.covariances, 0.25 * model.root.changes.covariances)
     back = fast.at_rate(FPS)
-    assert back.root is not None
     np.testing.assert_allclose(back.root.changes.means, model.root.changes.means)
 
 
@@ -174,8 +166,6 @@ def test_a_file_keeps_it_and_refuses_what_does_not_fit(model: BehaviourModel, tm
     path = tmp_path / "turning.behaviour"
     write_model(model, path)
     back = read_model(path)
-    assert model.root is not None
-    assert back.root is not None
     for one, other in ((back.root.frame, model.root.frame), (back.root.changes, model.root.changes)):
         for field in dataclasses.fields(one):
             np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
@@ -190,7 +180,6 @@ def test_a_file_keeps_it_and_refuses_what_does_not_fit(model: BehaviourModel, tm
 
 
 def test_new_clusters_are_appended(model: BehaviourModel) -> None:
-    assert model.root is not None
     width = len(model.root.frame.columns)
     more = gaussians_of(np.full((30, width), 2.0), np.ones((30, 1)))
     both = model.root.joined(more)

@@ -170,7 +170,6 @@ def searched(
         if resumed:
             state = search.state
             sets.append(state.particles)
-    assert search is not None
     return {"records": records, "sets": sets, "result": search.result()}
 
 
@@ -207,8 +206,6 @@ def weighed_there() -> dict[str, Any]:
     three = EdgeRegionSilhouetteLikelihood(person, cameras, settings)
     two = EdgeRegionLikelihood(person, cameras, EdgeRegionSettings(device="gpu", **SAMPLES))
     of_three, of_two = three.problem(evidence).on_device(), two.problem(evidence).on_device()
-    assert of_three is not None
-    assert of_two is not None
     return {
         "records": records,
         "leader": search.result().estimate.mode,

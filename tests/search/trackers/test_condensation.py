@@ -44,7 +44,6 @@ def test_scale_lets_a_share_survive_whatever_the_weighting(width: float) -> None
     assert all(np.isnan(record.alpha_wanted) for record in later)
     assert np.mean([0.05 <= record.alpha_reached <= 0.2 for record in later]) >= 0.9
     last = carried[-1].particles
-    assert last is not None
     assert len(last.extra[SCALES]) == 5
 
 

@@ -80,7 +80,6 @@ def test_a_frame_comes_nearer_and_the_next_starts_there(body: BodyModel, truth: 
     found = refined(pose)
     assert off(body, found.estimate.pose, truth) < 0.5 * off(body, pose, truth)
     assert np.array_equal(found.estimate.searched, pose)
-    assert found.carried.particles is not None
     assert (found.carried.particles.poses == found.estimate.pose).all()
     assert np.array_equal(found.carried.estimate, found.estimate.pose)
     again = refined(pose)

@@ -84,7 +84,6 @@ def test_the_truth_is_followed(name: str) -> None:
 def test_states_never_leave_the_automaton(name: str) -> None:
     results, _ = followed(name, 12)
     for result in results:
-        assert result.carried.particles is not None
         extra = result.carried.particles.extra
         states = extra[LEADER_STATE if name == "swarm" else STATES]
         assert states.dtype == np.int64
@@ -101,7 +100,6 @@ def test_states_of_the_reported_pose_are_those_of_the_movement(name: str) -> Non
     hits = 0
     for frame in range(4, 30):
         particles = results[frame].carried.particles
-        assert particles is not None
         best = int(np.argmax(particles.log_weights)) if name != "swarm" else 0
         state = particles.extra[LEADER_STATE if name == "swarm" else STATES][best]
         hits += int(MODEL.automaton.last_symbols[int(state)]) == frame // 10
@@ -125,8 +123,6 @@ def test_same_seed_same_result_and_any_checkpoint_resumes_bit_for_bit(name: str)
         again, _ = finished_from(state)
         assert np.array_equal(again.estimate.pose, whole.estimate.pose)
         one, other = again.carried.particles, whole.carried.particles
-        assert one is not None
-        assert other is not None
         assert one.extra.keys() == other.extra.keys()
         assert all(np.array_equal(one.extra[key], other.extra[key]) for key in one.extra)
 
@@ -135,8 +131,6 @@ def test_the_stored_state_is_read_back_bit_for_bit(name: str) -> None:
     results, records = followed(name, 2)
     stored = unpack_result(pack_result(results[-1])).carried.particles
     kept = results[-1].carried.particles
-    assert stored is not None
-    assert kept is not None
     assert stored.extra.keys() == kept.extra.keys()
     for key, values in kept.extra.items():
         assert stored.extra[key].dtype == values.dtype
@@ -155,7 +149,6 @@ def test_hard_priors_hold_in_guided_sets(name: str, constraints: str) -> None:
     for record in records:
         assert np.all(record.poses[:, 3] <= Walled.wall)
     for result in results:
-        assert result.carried.particles is not None
         states = result.carried.particles.extra[LEADER_STATE if name == "swarm" else STATES]
         assert np.all((states >= 0) & (states < MODEL.states))
 
@@ -234,7 +227,6 @@ def test_a_model_may_be_added_and_removed_between_frames() -> None:
             settings_source=lambda now=now: (1, now),
         )
         carried = result.carried
-        assert carried.particles is not None
         assert (STATES in carried.particles.extra) == (now.prediction == "behaviour")
 
 
@@ -279,6 +271,5 @@ def test_weights_may_be_used_unchanged() -> None:
 def test_the_verdict_travels_from_frame_to_frame(name: str) -> None:
     results, _ = followed(name, 4)
     last = results[-1].carried.particles
-    assert last is not None
     assert last.extra[BEATEN].shape == (1,)
     assert 0.0 < last.extra[BEATEN][0] < 1.0

@@ -185,7 +185,6 @@ def test_a_swarms_particle_that_is_stuck_has_no_velocity() -> None:
     for _ in range(4):
         record = found.step(Narrow(0.0), 1, settings)
         assert np.array_equal(record.poses, np.full((20, 3), -0.2))
-        assert found.state.particles is not None
         assert not found.state.particles.extra[VELOCITIES].any()
 
 

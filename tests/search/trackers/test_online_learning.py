@@ -162,7 +162,6 @@ def test_states_stand_for_the_same_histories_in_the_next_automaton(name: str) ->
     states = np.arange(MODEL.states)
     particles = ParticleSet(np.zeros((len(states), 9)), np.zeros(len(states)), extra={name: states})
     carried = translated(FilterState(particles), MODEL.automaton, after.automaton)
-    assert carried.particles is not None
     found = carried.particles.extra[name]
     for before, now in zip(states, found, strict=True):
         history, context = MODEL.automaton.contexts[before], after.automaton.contexts[now]
@@ -185,6 +184,5 @@ def test_only_at_a_lesson_are_states_translated() -> None:
     assert learner.carried_into(99, carried, tracked) is carried
     assert learner.carried_into(0, carried, tracked) is carried
     moved = learner.carried_into(300, carried, tracked)
-    assert moved.particles is not None
     model = learner.model_in(300, tracked)
     assert np.all(model.automaton.last_symbols[moved.particles.extra[STATES].astype(int)] == 1)

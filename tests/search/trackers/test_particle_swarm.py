@@ -213,7 +213,6 @@ def test_the_bottom_of_a_bowl_is_found(seed: int) -> None:
             SwarmSettings(position_divisor=2.0), Bowl(centre), start, seed=seed, frame=frame
         )
         start = result.carried
-    assert result is not None
     assert np.abs(result.estimate.pose - centre).max() < 0.05
 
 

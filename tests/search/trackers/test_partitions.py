@@ -32,7 +32,6 @@ def sets_of(partition: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
     poses, leaders = [], []
     while not search.finished:
         poses.append(search.step(Bowl(np.zeros(COUNT)), 1, settings_of(partition)).poses)
-        assert search.state.particles is not None
         leaders.append(search.state.particles.extra[LEADER])
     return poses, leaders
 

@@ -102,7 +102,6 @@ def test_shapes(name: str) -> None:
             TRACKERS[name].settings_type(**sizes(name, 70))
         )
         last = result.carried.particles
-        assert last is not None
         assert np.exp(last.log_weights).sum() == pytest.approx(1.0)
 
 
@@ -241,8 +240,6 @@ def test_checkpoint_and_resume_are_bit_identical(name: str) -> None:
         resumed, _ = finished_from(state)
         assert np.array_equal(resumed.estimate.pose, whole.estimate.pose)
         one, other = resumed.carried.particles, whole.carried.particles
-        assert one is not None
-        assert other is not None
         assert np.array_equal(one.poses, other.poses)
         assert np.array_equal(one.log_weights, other.log_weights)
         assert one.extra.keys() == other.extra.keys()
@@ -289,7 +286,6 @@ def test_weights_that_say_little_leave_a_defined_answer(name: str, kind: str) ->
         assert np.isfinite(result.estimate.pose).all()
         assert np.isfinite(result.estimate.log_weight)
         particles = result.carried.particles
-        assert particles is not None
         assert np.isfinite(particles.poses).all()
         assert np.exp(particles.log_weights).sum() == pytest.approx(1.0)
     assert all(np.isfinite(record.poses).all() for record in records)
