@@ -2,9 +2,7 @@
 
 import importlib
 import inspect
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +10,7 @@ from types import SimpleNamespace
 import numba
 import numpy as np
 import pytest
+from simulated_card import run_simulated
 from simulated_weighing import FEW_WORDS, SAMPLES, SCENES, scene_of, terms_of
 from weighting_scene import four_cameras
 
@@ -37,16 +36,7 @@ HERE = Path(__file__).parent
 def simulated(tmp_path_factory):
     """What a card's kernels give, in a process whose card is simulated."""
     place = tmp_path_factory.mktemp("device") / "terms.npz"
-    simulator = {
-        "NUMBA_ENABLE_CUDASIM": "1",
-        "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": os.pathsep.join(map(str, (HERE, HERE.parents[1], HERE.parents[2]))),
-    }
-    # Words of 64 bits wrap around where masks are packed, on purpose.
-    wrapping = "ignore:overflow encountered in scalar:RuntimeWarning"
-    script = [sys.executable, "-W", "error", "-W", wrapping, str(HERE / "simulated_weighing.py"), str(place)]
-    done = subprocess.run(script, env={**os.environ, **simulator}, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    run_simulated(HERE / "simulated_weighing.py", place)
     with np.load(place) as found:
         return dict(found)
 

@@ -1,13 +1,11 @@
 """Searches whose particles stay on a card: in Numba's simulator against NumPy, and what the processor does."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from simulated_card import run_simulated
 from simulated_search import COUNT, LAST, PLAN, SEEDS, SETTINGS, last_set, problem_of
 
 from studio.foundations import numba_on_devices
@@ -31,17 +29,7 @@ OF_RUN, OF_PARENTS, OF_CUTS, OF_NOISE = 0, 1, 2, 16
 def simulated(tmp_path_factory):
     """What searches on a simulated card give."""
     place = tmp_path_factory.mktemp("search") / "found.npz"
-    simulator = {
-        "NUMBA_ENABLE_CUDASIM": "1",
-        "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": os.pathsep.join(
-            map(str, (HERE, HERE.parent / "likelihood", HERE.parents[1], HERE.parents[2]))
-        ),
-    }
-    wrapping = "ignore:overflow encountered in scalar:RuntimeWarning"
-    script = [sys.executable, "-W", "error", "-W", wrapping, str(HERE / "simulated_search.py"), str(place)]
-    done = subprocess.run(script, env={**os.environ, **simulator}, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    run_simulated(HERE / "simulated_search.py", place)
     with np.load(place) as found:
         return dict(found)
 

@@ -5,9 +5,7 @@ frame whose swarm stays there, goes to the processor and comes back.
 import dataclasses
 import importlib
 import inspect
-import os
 import pickle
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,6 +14,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from simulated_card import run_simulated
 
 HERE = Path(__file__).parent
 sys.path.append(str(HERE.parent / "likelihood"))
@@ -59,17 +58,7 @@ EXACT = {"rtol": 3e-7, "atol": 2e-7}
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What swarms do in a process whose device is simulated."""
     place = tmp_path_factory.mktemp("swarm") / "found.pickle"
-    folders = HERE, HERE.parent / "likelihood", HERE.parents[1], HERE.parents[2]
-    simulator = {
-        "NUMBA_ENABLE_CUDASIM": "1",
-        "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": os.pathsep.join(map(str, folders)),
-    }
-    # Words of 64 bits wrap around where masks are packed, on purpose.
-    wrapping = "ignore:overflow encountered in scalar:RuntimeWarning"
-    script = [sys.executable, "-W", "error", "-W", wrapping, str(HERE / "simulated_swarm.py"), str(place)]
-    done = subprocess.run(script, env={**os.environ, **simulator}, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    run_simulated(HERE / "simulated_swarm.py", place)
     return pickle.loads(place.read_bytes())
 
 
