@@ -3,13 +3,13 @@
 import hashlib
 import json
 import os
-import random
 import shutil
 import signal
 import subprocess
 import sys
 import time
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,8 +58,9 @@ class Campaign:
         """
         every = [one for file in room.sources() for one in changes(file, (self._root / file).read_text())]
         tally = Tally(len(every))
-        for change in random.Random(f"{seed} {room.name}").sample(every, min(count, len(every))):
-            if (change.file, change.words) in self._equivalent:
+        for change in drawn(every, seed)[:count]:
+            line = (self._root / change.file).read_text().split("\n")[change.line - 1].strip()
+            if (change.file, line, change.words) in self._equivalent:
                 tally.drawn, tally.equivalent = tally.drawn + 1, tally.equivalent + 1
                 continue
             key = self._key(change)
@@ -138,6 +139,17 @@ class Campaign:
         print(f"{fate:10} {change.file}:{change.line} {change.words}", file=sys.stderr, flush=True)
 
 
+def drawn(every: Sequence[Change], seed: int) -> list[Change]:
+    """All changes in an order that depends on the seed; what is changed elsewhere moves none before another."""
+    met: Counter[str] = Counter()
+    order: list[tuple[str, Change]] = []
+    for change in every:
+        name = f"{seed} {change.file} {change.words}"
+        met[name] += 1
+        order.append((hashlib.sha256(f"{name} {met[name]}".encode()).hexdigest(), change))
+    return [change for _, change in sorted(order)]
+
+
 def table(tallies: dict[str, Tally]) -> str:
     """Room by room, and below each change that survived."""
     lines = [
@@ -154,8 +166,9 @@ def table(tallies: dict[str, Tally]) -> str:
     return "\n".join(lines)
 
 
-def _listed(file: Path) -> set[tuple[str, str]]:
-    return {(one["file"], one["change"]) for one in tomllib.loads(file.read_text()).get("equivalent", [])}
+def _listed(file: Path) -> set[tuple[str, str, str]]:
+    listed = tomllib.loads(file.read_text()).get("equivalent", [])
+    return {(one["file"], one["line"], one["change"]) for one in listed}
 
 
 def _read(log: Path) -> dict[str, str]:

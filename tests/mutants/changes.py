@@ -83,6 +83,8 @@ def _forms(node: ast.AST) -> Iterator[tuple[ast.AST, str]]:
         return
     if isinstance(node, ast.Call) and _called(node) in DECLARING:
         return
+    if isinstance(node, ast.keyword) and node.arg == "strict":
+        return  # of zips whose sides are as long
     yield from ((node, made) for made in _made(node))
     for name, value in ast.iter_fields(node):
         if name in ("decorator_list", "annotation", "returns", "type_params"):

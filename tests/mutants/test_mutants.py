@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutants.campaign import Campaign, table
+from mutants.campaign import Campaign, drawn, table
 from mutants.changes import changes
 from mutants.rooms import ROOMS, Room
 
@@ -68,7 +68,7 @@ def test_what_its_tests_see_is_killed_and_the_rest_survives(
 ) -> None:
     equivalent = checkout / "equivalent.toml"
     equivalent.write_text(
-        '[[equivalent]]\nfile = "toy/room/one.py"\nchange = "-value -> (value)"\nwhy = "it is"\n'
+        '[[equivalent]]\nfile = "toy/room/one.py"\nline = "-value,"\nchange = "-value -> (value)"\nwhy = "it is"\n'
     )
     room = Room(checkout, "room", "toy")
     options = {"count": 20, "seed": 0, "again": False, "whole": False}
@@ -107,6 +107,14 @@ def test_changes_are_one_at_a_time_and_can_be_read() -> None:
     for one in found.values():
         ast.parse(one.applied(SOURCE))
     assert "value <= LIMIT" in found["value < LIMIT -> value <= LIMIT"].applied(SOURCE)
+
+
+def test_the_order_of_drawing_outlives_changes_elsewhere() -> None:
+    every = changes("one.py", SOURCE)
+    longer = changes("one.py", SOURCE.replace("LIMIT = 3", "LIMIT = 3\nOTHER = 7\n"))
+    words = [one.words for one in drawn(every, 0)]
+    assert words == [one.words for one in drawn(longer, 0) if one.words != "7 -> 8"]
+    assert words != [one.words for one in drawn(every, 1)]
 
 
 def test_a_change_is_shown_to_the_tests_that_import_its_file(checkout: Path) -> None:
