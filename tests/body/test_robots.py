@@ -197,6 +197,15 @@ def test_a_urdf_is_where_its_own_matrices_put_it(tmp_path: Path) -> None:
         )
 
 
+def test_masses_that_mujoco_refuses_do_not_matter(tmp_path: Path) -> None:
+    heavy = '<link name="lift"><inertial><mass value="-1"/><inertia ixx="-1" ixy="0" ixz="0" iyy="1" iyz="0" izz="9"/>'
+    text = GRIPPER.replace('<link name="lift"/>', f"{heavy}</inertial></link>")
+    plain, odd = (
+        load_body(str(written(tmp_path, f"{n}.urdf", one))) for n, one in enumerate((GRIPPER, text))
+    )
+    assert [limb.length for limb in odd.limbs] == [limb.length for limb in plain.limbs]
+
+
 def test_links_without_geometry_get_the_stated_radius(tmp_path: Path) -> None:
     body = load_body(str(written(tmp_path, "gripper.urdf", GRIPPER)))
     lift = [limb for limb in body.limbs if limb.name.startswith("lift")]

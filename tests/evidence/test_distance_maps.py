@@ -89,3 +89,15 @@ def test_distances_do_not_depend_on_where_the_mask_lies(exact: bool) -> None:
         moved = room[offset : offset + mask.size].reshape(mask.shape)
         moved[:] = mask
         assert (distances_of(moved, exact=exact).signed == first).all()
+
+
+@pytest.mark.parametrize(("left", "top"), [(2, 50), (50, 2)])
+def test_distances_cover_what_is_hidden_far_from_the_mask(left: int, top: int) -> None:
+    hidden = np.zeros_like(disc())
+    hidden[top : top + 6, left : left + 6] = 1
+    found = distances_of(disc(), hidden=hidden)
+    x, y = left - found.corner[0], top - found.corner[1]
+    assert x >= 0
+    assert y >= 0
+    assert (found.signed[y : y + 6, x : x + 6] == 0.0).all()
+    assert found.signed[y : y + 6, x : x + 6].shape == (6, 6)
