@@ -1,6 +1,6 @@
 """The API as a script talks to it: a request, an answer that is as expected, its JSON."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import httpx
@@ -58,14 +58,21 @@ class ApiDriver:
             self.put(f"/api/uploads/{identifier}/files", params={"path": name}, content=content)
         return identifier
 
+    def when(self, path: str, wanted: Callable[[dict], object]) -> dict:
+        """What an address answers once it is as wanted."""
+        answers: list[dict] = []
+
+        def is_wanted() -> object:
+            answers[:] = [self.get(path)]
+            return wanted(answers[0])
+
+        until(is_wanted)
+        return answers[0]
+
     def ended(self, path: str, entry: str = "") -> dict:
         """The state of the job at an address (or in an entry of the answer) once it is over."""
-        state: dict = {}
 
-        def is_over() -> bool:
-            answer = self.get(path)
-            state.update((answer[entry] if entry else answer) or {})
-            return state.get("state") in OVER
+        def job_of(answer: dict) -> dict:
+            return (answer[entry] if entry else answer) or {}
 
-        until(is_over)
-        return state
+        return job_of(self.when(path, lambda answer: job_of(answer).get("state") in OVER))

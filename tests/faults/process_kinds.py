@@ -21,6 +21,7 @@ import numpy as np
 import psutil
 from mjpeg_streams import Streams, jpeg, served
 from toy_session import facing_camera
+from waiting import until
 from websockets.sync.client import ClientConnection, connect
 
 from faults.seams import ALL, STORE, WRITE, Touch, watched
@@ -41,14 +42,6 @@ from studio.sessions.session import Session
 PATIENCE = 600.0
 REFUSED = 3
 """The exit code of a child whose deed was refused in words."""
-
-
-def until(condition: Callable[[], object]) -> None:
-    """Return when the condition holds; fails when it never does."""
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, "it never came about"
-        time.sleep(0.02)
 
 
 # ---------------------------------------------------------------------- a process that does a deed

@@ -1,14 +1,12 @@
 """Live cameras over the API: looked at, recorded; what no camera is, is refused."""
 
 import io
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import cv2
 import numpy as np
 import pytest
 from mjpeg_streams import Streams, jpeg, served
-from waiting import PATIENCE
 from web_doubles import Studio
 
 SECRET = "geheim"
@@ -26,23 +24,13 @@ def streams() -> Iterator[Streams]:
         yield made
 
 
-def until(studio: Studio, path: str, done: Callable[[dict], bool]) -> dict:
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.get(path)
-        if done(response):
-            return response
-    raise AssertionError(f"{path}: {response}")
-
-
 def shown(studio: Studio, streams: Streams) -> dict:
     secret = streams.address("cam1").replace("http://", f"http://root:{SECRET}@")
     request = {
         "cameras": [{"name": "cam1", "address": secret}, {"name": "cam2", "address": streams.address("cam2")}]
     }
     studio.post("/api/cameras/preview", request)
-    return until(
-        studio,
+    return studio.when(
         "/api/cameras",
         lambda response: (
             all(one["pictures"] > 5 for one in response["cameras"]) and response["spread"]["sets"]
@@ -75,11 +63,11 @@ def test_cameras_are_looked_at(studio: Studio, streams: Streams) -> None:
 def test_a_stream_that_stops_is_reported(studio: Studio, streams: Streams) -> None:
     shown(studio, streams)
     streams.silent.add("cam2")
-    response = until(studio, "/api/cameras", lambda response: response["cameras"][1]["state"] == "stopped")
+    response = studio.when("/api/cameras", lambda response: response["cameras"][1]["state"] == "stopped")
     assert response["cameras"][0]["state"] == "running"
     assert response["cameras"][1]["age"] >= 1.0
     streams.silent.clear()
-    until(studio, "/api/cameras", lambda response: response["cameras"][1]["state"] == "running")
+    studio.when("/api/cameras", lambda response: response["cameras"][1]["state"] == "running")
 
 
 @pytest.mark.slow
@@ -89,13 +77,12 @@ def test_cameras_are_recorded_into_a_session(studio: Studio, streams: Streams) -
     studio.post("/api/recordings", {"name": "take2", "calibration": "take1"}, code=202)
     studio.post("/api/recordings", {"name": "take3", "calibration": "take1"}, code=409)
     studio.post("/api/cameras/preview", {"cameras": []}, code=409)
-    until(
-        studio,
+    studio.when(
         "/api/recordings",
         lambda response: response["step"] == "recording" and response["seconds"] > 0.7,
     )
     studio.post("/api/recordings/stop", code=202)
-    response = until(studio, "/api/recordings", lambda response: response["state"] in ("done", "failed"))
+    response = studio.when("/api/recordings", lambda response: response["state"] in ("done", "failed"))
     assert response["state"] == "done", response
     assert "ms apart" in response["words"]
     made = studio.workspace.session("take2")

@@ -36,13 +36,8 @@ def compared(studio: Studio) -> Studio:
 
 def until(studio: Studio, name: str, *statuses: str) -> dict:
     """The comparison when it has come to one of these states."""
-    deadline = time.monotonic() + waiting.PATIENCE
-    while time.monotonic() < deadline:
-        response = studio.get(f"/api/comparisons/walk/{name}")
-        if response["comparison"]["status"] in statuses:
-            return response
-        time.sleep(0.05)
-    raise AssertionError(f"it never was {statuses}")
+    path = f"/api/comparisons/walk/{name}"
+    return studio.when(path, lambda answer: answer["comparison"]["status"] in statuses)
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ import dask
 import pytest
 from distributed import LocalCluster
 from toy_experiments import toy
+from waiting import until
 
 from studio.foundations.errors import FootageError, RunError, StudioError
 from studio.foundations.progress import report
@@ -77,13 +78,6 @@ def go_on_reporting(place: Path) -> None:
             time.sleep(0.05)
     finally:
         (place / "ended").touch()
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def jobs_of(log: Path, seeds: int, **deeds: str) -> list[TrialJob]:
