@@ -1,6 +1,7 @@
 """Faults of processes, and of what is at the other end of a wire, as a table like that of `kinds`."""
 
 import contextlib
+import functools
 import json
 import multiprocessing
 import os
@@ -19,9 +20,9 @@ from pathlib import Path
 import httpx
 import numpy as np
 import psutil
+import waiting
 from mjpeg_streams import Streams, jpeg, served
 from toy_session import facing_camera
-from waiting import until
 from websockets.sync.client import ClientConnection, connect
 
 from faults.seams import ALL, STORE, WRITE, Touch, watched
@@ -40,6 +41,7 @@ from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
 
 PATIENCE = 600.0
+until = functools.partial(waiting.until, patience=PATIENCE)
 REFUSED = 3
 """The exit code of a child whose deed was refused in words."""
 
