@@ -2,9 +2,6 @@
 
 import importlib
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +9,7 @@ import numba
 import numpy as np
 import pytest
 from scipy.ndimage import label
+from simulated_card import run_simulated
 
 from studio.body.catalogue import load_body
 from studio.garden.benchmarks.devices import run_device_benchmark
@@ -133,20 +131,8 @@ def test_without_a_card_the_bench_says_so(monkeypatch):
 
 def test_frames_of_a_simulated_card_are_measured(tmp_path):
     """A swarm's, and those of seeds side by side, which are the ones alone."""
-    tests = Path(__file__).parents[2]
-    script = Path(__file__).with_name("simulated_card.py")
-    folders = tests / "search" / "trackers", tests / "search" / "likelihood", tests, tests.parent
-    simulator = {
-        "NUMBA_ENABLE_CUDASIM": "1",
-        "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": os.pathsep.join(map(str, folders)),
-    }
-    place = tmp_path / "found.json"
-    wrapping = "ignore:overflow encountered in scalar:RuntimeWarning"
-    command = [sys.executable, "-W", "error", "-W", wrapping, str(script), str(place)]
-    done = subprocess.run(command, env={**os.environ, **simulator}, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(place.read_text())
+    script = Path(__file__).parents[2] / "search" / "trackers" / "simulated_frames.py"
+    found = json.loads(run_simulated(script, tmp_path / "found.json").read_text())
     assert found["swarm"]["evaluations"] == 12
     assert found["seeds"]["same_as_alone"]
     assert min(found["swarm"]["frame"], found["seeds"]["times_one"]) > 0.0
