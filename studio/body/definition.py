@@ -9,6 +9,8 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     [dimensions]                      # everything that differs between subjects
     thigh_length = { mm = 424.8, of_height = 0.245 }   # of_height: published share of a person's height
     torso_flatness = { ratio = 0.88 }                  # a number without unit
+    chest_forward = { mm = 0, spread = 10 }            # flesh beside the bone, also below 0; spread: standard deviation
+    chest_depth = { ratio = 0.8, spread = 0.05 }       # among people, where a run fits it to its first frames
 
     [[parameters]]                    # the pose vector, in order
     name = "left_knee"
@@ -18,6 +20,7 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     upper = 150
     neutral = 5                       # the rest pose; a list of numbers and dimensions: their sum; absent: 0
     max_step = 650                    # largest expected movement, degrees or mm per second
+    spread = 15                       # optional: usual deviation from rest, of angles that silhouettes hardly show
     limb = "left leg"                 # parameters of one limb are neighbours
 
     [[joints]]                        # parents before children
@@ -55,17 +58,23 @@ WORLD = "world"
 
 
 class DimensionEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A size that differs between subjects: `mm` or (without unit) `ratio`, and its share of a height."""
+    """A size that differs between subjects: `mm` or (without unit) `ratio`, its share of a height, and its spread."""
 
     mm: float | None = None
     ratio: float | None = None
     of_height: float | None = None
+    spread: float | None = None
 
     @property
     def value(self) -> float:
         """The body's own value, mm or a ratio (exactly one of the two is given)."""
         given = self.mm if self.mm is not None else self.ratio
         return math.nan if given is None else given
+
+    @property
+    def is_offset(self) -> bool:
+        """Whether it is a place of flesh beside the bone, which may be negative."""
+        return self.mm is not None and self.spread is not None
 
 
 class ParameterEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -79,6 +88,7 @@ class ParameterEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     lower: float = -math.inf
     upper: float = math.inf
     neutral: float | tuple[float | str, ...] = 0.0
+    spread: float = math.inf
 
 
 class StepEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

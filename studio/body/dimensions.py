@@ -53,7 +53,7 @@ def with_dimensions(body: BodyModel, changes: Mapping[str, float]) -> BodyModel:
         if name not in body.dimensions:
             known = ", ".join(body.dimensions) or "none"
             raise BodyError(f"Body '{body.name}' has no dimension '{name}'.", f"Known: {known}.")
-        if not (math.isfinite(value) and value >= 0.0):
+        if not (math.isfinite(value) and (value >= 0.0 or body.definition.dimensions[name].is_offset)):
             raise BodyError(
                 f"Dimension '{name}' cannot be {value}.", "Give a finite number that is not negative."
             )

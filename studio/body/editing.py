@@ -119,7 +119,7 @@ def _with_size(definition: BodyDefinition, name: str, value: float, notes: list[
 def _with_dimension(definition: BodyDefinition, name: str, value: float) -> BodyDefinition:
     entry = definition.dimensions[name]
     is_ratio = entry.ratio is not None
-    _check_size(f"Dimension '{name}'", value, is_ratio)
+    _check_size(f"Dimension '{name}'", abs(value) if entry.is_offset else value, is_ratio)
     changed = msgspec.structs.replace(entry, **{unit_of(entry): value})
     return msgspec.structs.replace(definition, dimensions={**definition.dimensions, name: changed})
 

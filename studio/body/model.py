@@ -6,6 +6,7 @@ fixed number or by one parameter of the pose vector), so any order and direction
 down. Lengths in mm, angles in radians here (degrees in body files).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -26,7 +27,7 @@ class Parameter:
 
     kind : "angle" (radians) or "length" (mm). lower, upper : limits, ±inf where unbounded. max_step : largest
     expected movement, rad/s or mm/s. neutral : the value in the rest pose. limb : group for crossover by
-    limbs.
+    limbs. spread : usual deviation from rest, inf where none is known.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Parameter:
     max_step: float
     neutral: float
     limb: str
+    spread: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +150,11 @@ class BodyModel:
         return np.array([entry.upper for entry in self.parameters])
 
     @property
+    def spread(self) -> Array:
+        """(D,) usual deviations from the rest pose, inf where none is known."""
+        return np.array([entry.spread for entry in self.parameters])
+
+    @property
     def angles(self) -> Mask:
         """(D,) which parameters are angles."""
         return np.array([entry.kind == "angle" for entry in self.parameters], dtype=np.bool_)
@@ -185,15 +192,29 @@ def moving_joint(body: BodyModel, joint: int) -> int:
     return joint
 
 
+def ends_of(body: BodyModel, limbs: Sequence[Limb]) -> Mask:
+    """(L,) which of some limbs are ends of the body: none of the others hangs from them. Flesh may lie on a fixed joint
+    beside its bone's, so that a limb also hangs from what its bone's joint hangs from.
+    """
+
+    def above(joint: int) -> set[int]:
+        joints = set[int]()
+        while joint >= 0 and (joint := body.joints[joint].parent) >= 0:
+            joints.add(joint)
+        return joints
+
+    bones = [moving_joint(body, limb.joint) for limb in limbs]
+    carrying = set[int]().union(*(above(limb.joint) for limb in limbs))
+    bearing = set[int]().union(*(above(bone) for bone in bones))
+    return np.array(
+        [limb.joint not in carrying and bone not in bearing for limb, bone in zip(limbs, bones, strict=True)],
+        dtype=np.bool_,
+    )
+
+
 def extremities(body: BodyModel) -> tuple[int, ...]:
     """Indices of the drawn limbs on which no other drawn limb's joint hangs."""
-    carried: set[int] = set()
-    for limb in body.drawn:
-        above = body.joints[limb.joint].parent
-        while above >= 0:
-            carried.add(above)
-            above = body.joints[above].parent
-    return tuple(index for index, limb in enumerate(body.drawn) if limb.joint not in carried)
+    return tuple(int(index) for index in np.flatnonzero(ends_of(body, body.drawn)))
 
 
 def checked_pose(body: BodyModel, pose: Sequence[float] | Array, error: type[StudioError]) -> Array:

@@ -82,10 +82,12 @@ class _Check:
                 self.fail(
                     f"dimension '{name}'", "needs exactly one of mm and ratio", "Write e.g. { mm = 420 }."
                 )
-            if not (math.isfinite(entry.value) and entry.value >= 0.0):
+            if not (math.isfinite(entry.value) and (entry.value >= 0.0 or entry.is_offset)):
                 self.fail(
                     f"dimension '{name}'", f"is {entry.value:g}", "Give a finite number that is not negative."
                 )
+            if entry.spread is not None and not (math.isfinite(entry.spread) and entry.spread > 0.0):
+                self.fail(f"dimension '{name}'", f"has spread {entry.spread:g}", "Give a number above 0.")
             if entry.of_height is None:
                 continue
             if entry.ratio is not None:
@@ -114,6 +116,10 @@ class _Check:
             if not (math.isfinite(neutral) and entry.lower <= neutral <= entry.upper):
                 cause = f"has neutral {neutral:g} outside its limits {entry.lower:g} to {entry.upper:g}"
                 self.fail(where, cause, "Give a rest value between the limits.")
+            if not entry.spread > 0.0:
+                self.fail(
+                    where, f"has spread {entry.spread:g}", "Give the usual deviation from rest, above 0."
+                )
             if not (math.isfinite(entry.max_step) and entry.max_step > 0.0):
                 self.fail(
                     where,
@@ -317,6 +323,7 @@ def parameter(entry: ParameterEntry, neutral: float) -> Parameter:
         max_step=entry.max_step * unit,
         neutral=neutral * unit,
         limb=entry.limb,
+        spread=entry.spread * unit,
     )
 
 

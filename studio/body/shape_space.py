@@ -4,6 +4,9 @@ Dimensions of a body file that set a joint's place or a limb's length are *lengt
 *radii*. Dimensions that are equal in a person (left and right) make a group, whose one number is the
 logarithm of a common factor: 0 is the unchanged body, 0.1 is 10.5 % more, and no value is impossible. A
 cone's two radii are two groups: shins taper more than the body file's, and a cone that cannot has its joints moved.
+
+Dimensions of which the file gives the spread among people are flesh: *ratios* of a cone's depth and width, and
+*offsets* of its axis from the bone, which may be negative: `OFFSET_SIGMA` is one standard deviation of these.
 """
 
 import dataclasses
@@ -16,22 +19,34 @@ import numpy as np
 
 from studio.body.definition import BodyDefinition, split_sign
 from studio.body.dimensions import with_dimensions
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, ends_of
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BodyError
 
 SIDE = re.compile(r"(^|_)(left|right)(_|$)")
 SMALL = ("foot_heel", "foot_drop", "ankle_height")
 """Offsets within a foot: they follow from the height, as silhouettes do not show them."""
+OFFSET_SIGMA = 0.15
+"""Number of an offset that is a standard deviation away: as a radius's, so that searches step alike."""
+Kind = Literal["length", "radius", "ratio", "offset"]
 
 
 @dataclass(frozen=True, slots=True)
 class ShapeGroup:
-    """Dimensions with a common factor. name : such as "thigh_length". kind : "length" or "radius"."""
+    """Dimensions with a common number. name : such as "thigh_length". spread : standard deviation, mm of an offset, of
+    a ratio's logarithm; 0 where the file has none.
+    """
 
     name: str
-    kind: Literal["length", "radius"]
+    kind: Kind
     dimensions: tuple[str, ...]
+    spread: float = 0.0
+
+    def resized(self, own: float, value: float) -> float:
+        """A dimension of the group, `own` in the unchanged body, where the group's number is `value`."""
+        if self.kind == "offset":
+            return own + self.spread / OFFSET_SIGMA * value
+        return own * float(np.exp(value))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,9 +62,9 @@ class ShapeSpace:
         return tuple(group.name for group in self.groups)
 
     def dimensions(self, shape: Array) -> dict[str, float]:
-        """The dimensions of a shape (S,): name to mm."""
+        """The dimensions of a shape (S,): name to mm or ratio."""
         return {
-            name: self.body.dimensions[name] * float(np.exp(value))
+            name: group.resized(self.body.dimensions[name], float(value))
             for group, value in zip(self.groups, shape, strict=True)
             for name in group.dimensions
         }
@@ -59,28 +74,33 @@ class ShapeSpace:
         return with_dimensions(self.body, self.dimensions(shape))
 
     def sizes(self, shape: Array) -> Array:
-        """(S,) mm: the mean of each group's dimensions."""
-        own = [np.mean([self.body.dimensions[name] for name in group.dimensions]) for group in self.groups]
-        return np.asarray(own, dtype=np.float64) * np.exp(shape)
+        """(S,) mm, ratios without a unit: the mean of each group's dimensions."""
+        sizes = self.dimensions(shape)
+        return np.array([np.mean([sizes[name] for name in group.dimensions]) for group in self.groups])
 
 
 def shape_space(
-    body: BodyModel, *, symmetric: bool = True, lengths: bool | Literal["ends"] = True, radii: bool = True
+    body: BodyModel,
+    *,
+    symmetric: bool = True,
+    lengths: bool | Literal["ends"] = True,
+    radii: bool = True,
+    flesh: bool = False,
 ) -> ShapeSpace:
     """The shape space of a body read from a file.
 
-    symmetric : left and right are one group. lengths, radii : what may change; "ends": only lengths that cannot be
-    taped (`end_lengths`). Dimensions that are zero (absent limbs) stay so. Raises BodyError where
-    nothing can change.
+    symmetric : left and right are one group. lengths, radii, flesh : what may change (flesh: ratios and offsets);
+    "ends": only lengths that cannot be taped (`end_lengths`). Lengths and radii that are zero (absent limbs) stay so.
+    Raises BodyError where nothing can change.
     """
     kinds = dimension_kinds(body.definition) if body.definition else {}
-    ends = end_lengths(body.definition) if body.definition else frozenset[str]()
-    chosen = {"length": bool(lengths), "radius": radii}
-    by_size: dict[tuple[str, str], list[str]] = {}
+    ends = end_lengths(body)
+    chosen = {"length": bool(lengths), "radius": radii, "ratio": flesh, "offset": flesh}
+    by_size: dict[tuple[str, Kind], list[str]] = {}
     for name, kind in kinds.items():
         if lengths == "ends" and kind == "length" and name not in ends:
             continue
-        if chosen[kind] and body.dimensions[name] > 0.0 and name not in SMALL:
+        if chosen[kind] and (body.dimensions[name] > 0.0 or kind == "offset") and name not in SMALL:
             by_size.setdefault((_group_name(name, symmetric), kind), []).append(name)
     if not by_size:
         raise BodyError(
@@ -88,14 +108,16 @@ def shape_space(
             "Give its lengths and radii in the body file as named dimensions.",
         )
     groups = tuple(
-        ShapeGroup(name, "length" if kind == "length" else "radius", tuple(dimensions))
+        ShapeGroup(name, kind, tuple(dimensions), _spread(body, dimensions[0], kind))
         for (name, kind), dimensions in by_size.items()
     )
     return ShapeSpace(body, groups)
 
 
-def dimension_kinds(definition: BodyDefinition) -> dict[str, str]:
-    """The dimensions that are a "length" (of a limb, or a joint's way from its parent) or a "radius", in order."""
+def dimension_kinds(definition: BodyDefinition) -> dict[str, Kind]:
+    """The dimensions that are a "length" (of a limb, or a joint's way from its parent), a "radius", a "ratio" or an
+    "offset", in order.
+    """
     lengths: set[str] = set()
     radii: set[str] = set()
     for joint in definition.joints:
@@ -103,18 +125,31 @@ def dimension_kinds(definition: BodyDefinition) -> dict[str, str]:
     for limb in definition.limbs:
         lengths.add(_name(limb.length))
         radii |= {_name(limb.radius_start), _name(limb.radius_end)}
-    return {
-        name: "radius" if name in radii else "length"
-        for name in definition.dimensions
-        if name in radii or name in lengths
-    }
+    kinds: dict[str, Kind] = {}
+    for name, entry in definition.dimensions.items():
+        if entry.spread is not None:
+            kinds[name] = "ratio" if entry.ratio is not None else "offset"
+        elif name in radii:
+            kinds[name] = "radius"
+        elif name in lengths:
+            kinds[name] = "length"
+    return kinds
 
 
-def end_lengths(definition: BodyDefinition) -> frozenset[str]:
+def end_lengths(body: BodyModel) -> frozenset[str]:
     """Lengths of limbs at the ends of the body: hands, feet, head."""
-    parents = {joint.parent for joint in definition.joints}
-    ends = {_name(limb.length) for limb in definition.limbs if limb.joint not in parents}
-    return frozenset(ends & definition.dimensions.keys())
+    if body.definition is None:
+        return frozenset()
+    limbs = zip(body.definition.limbs, ends_of(body, body.limbs), strict=True)
+    return frozenset({_name(limb.length) for limb, is_end in limbs if is_end} & body.dimensions.keys())
+
+
+def _spread(body: BodyModel, name: str, kind: Kind) -> float:
+    """The spread of a dimension's group (`ShapeGroup`)."""
+    spread = body.definition.dimensions[name].spread if body.definition else None
+    if spread is None:
+        return 0.0
+    return spread / body.dimensions[name] if kind == "ratio" else spread
 
 
 def _name(value: float | str) -> str:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from studio.body.catalogue import load_body
-from studio.body.forward_kinematics import limb_ends
-from studio.body.shape_space import levelled, shape_space
+from studio.body.forward_kinematics import joint_frames, limb_ends
+from studio.body.model import extremities
+from studio.body.shape_space import OFFSET_SIGMA, end_lengths, levelled, shape_space
 from studio.foundations.errors import BodyError
 
 
@@ -38,6 +39,36 @@ def test_zero_is_the_body_and_a_factor_is_one() -> None:
 def test_a_dog_has_a_shape_too() -> None:
     space = shape_space(load_body("dog"))
     assert {"femur_length", "chest_radius_start"} <= set(space.names)
+
+
+def test_flesh_may_lie_either_side_of_the_bone() -> None:
+    space = shape_space(load_body("human35"), lengths=False, radii=False, flesh=True)
+    kinds = {group.name: group.kind for group in space.groups}
+    assert (kinds["thorax_forward"], kinds["thorax_depth"]) == ("offset", "ratio")
+    shape = np.full(len(space.groups), -OFFSET_SIGMA)
+    thinner = space.body_of(shape)
+    assert thinner.dimensions["thorax_forward"] == pytest.approx(-20.0)
+    assert thinner.dimensions["thorax_depth"] == pytest.approx(0.8 * np.exp(-OFFSET_SIGMA))
+    number = [limb.name for limb in thinner.drawn].index("thorax")
+    moved = limb_ends(thinner, thinner.neutral) - limb_ends(space.body, space.body.neutral)
+    np.testing.assert_allclose(moved[0, number], [[-20.0, 0.0, 0.0]] * 2, atol=1e-9)
+    joints = joint_frames(thinner, thinner.neutral) - joint_frames(space.body, space.body.neutral)
+    flesh = [joint.name.endswith("_flesh") for joint in thinner.joints]
+    assert np.abs(joints[0, ~np.array(flesh)]).max() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("body", "inner"),
+    [("human35", {"thorax_length", "pelvis_length"}), ("dog", {"chest_length", "loin_length"})],
+)
+def test_a_trunk_whose_flesh_lies_beside_the_bone_is_no_end(body: str, inner: set[str]) -> None:
+    model = load_body(body)
+    ends = end_lengths(model)
+    assert "head_length" in ends
+    assert not ends & inner
+    assert not {"thorax", "pelvis", "chest", "loin"} & {
+        model.drawn[index].name for index in extremities(model)
+    }
 
 
 def test_absent_limbs_stay_absent() -> None:

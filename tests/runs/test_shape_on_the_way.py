@@ -56,7 +56,7 @@ def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
         posture(0),
         default_sigma(body, 30.0),
     )
-    lengths = {name for name, kind in kinds.items() if kind == "length"} - end_lengths(body.definition)
+    lengths = {name for name, kind in kinds.items() if kind == "length"} - end_lengths(body)
     assert all(found.body.dimensions[name] == body.dimensions[name] for name in lengths)
     ratios = [found.body.dimensions[name] / body.dimensions[name] for name in radii]
     assert np.mean(ratios) > 1.15

@@ -1,4 +1,4 @@
-"""The subject's shape from the first frames of a run: all radii, and the lengths that no tape measures.
+"""The subject's shape from the first frames of a run: radii, flesh beside the bones, and lengths that no tape measures.
 
 Cones too thin or too thick for the clothed body shift the joints (arms ride up by centimetres), and the silhouettes
 give the ends of hands, feet and head. So before a run begins, its first frames are tracked, the shape is fitted
@@ -22,7 +22,7 @@ import numpy as np
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
-from studio.body.shape_space import ShapeSpace, dimension_kinds, shape_space
+from studio.body.shape_space import ShapeGroup, ShapeSpace, dimension_kinds, shape_space
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.settings import EvidenceSettings
@@ -59,17 +59,18 @@ STEP = "fitting the shape"
 SCHEMA_VERSION, FOLDER = 1, "shapes"
 WORDED = 5.0
 """mm (of a person: `scale_of`): smaller changes are not reported."""
+WORDED_RATIO = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedShape:
-    """body : with the shape. start : (D,) its pose in the first frame. sizes : group to mm, before and after. overlap :
-    f_s before and after, mean over the fitted frames.
+    """body : with the shape. start : (D,) its pose in the first frame. sizes : of each group before and after, mm or
+    without a unit. overlap : f_s before and after, mean over the fitted frames.
     """
 
     body: BodyModel
     start: Array
-    sizes: Mapping[str, tuple[float, float]]
+    sizes: Mapping[ShapeGroup, tuple[float, float]]
     overlap: tuple[float, float]
 
 
@@ -187,7 +188,7 @@ def fitted_shape(
     body: BodyModel, cameras: tuple[Camera, ...], frames: Sequence[FrameEvidence], poses: Array
 ) -> FittedShape:
     """The shape of a body on some frames' masks, from its poses there (F, D), which are in the right valley."""
-    space = shape_space(body, lengths="ends")
+    space = shape_space(body, lengths="ends", flesh=True)
     prior = ShapePrior(space, ShapeSpreads(), None)
     borders = [silhouette_distances(frame) for frame in frames]
     fit = ShapeRefiner(ShapePrograms(space), cameras, borders, prior, lengths_known=True).refine(
@@ -212,20 +213,25 @@ def _judging(settings: RunSettings) -> RunSettings:
     return dataclasses.replace(default_settings(TRACKER, WEIGHTING), evidence=settings.evidence)
 
 
-def _sizes(space: ShapeSpace, shape: Array) -> dict[str, tuple[float, float]]:
+def _sizes(space: ShapeSpace, shape: Array) -> dict[ShapeGroup, tuple[float, float]]:
     before, after = space.sizes(np.zeros_like(shape)), space.sizes(shape)
     return {
-        name: (float(one), float(other)) for name, one, other in zip(space.names, before, after, strict=True)
+        group: (float(one), float(other))
+        for group, one, other in zip(space.groups, before, after, strict=True)
     }
 
 
 def _words(shape: FittedShape, frames: range) -> str:
-    changed = [
-        f"{name.replace('_', ' ')} {one:.0f} → {other:.0f}"
-        for name, (one, other) in shape.sizes.items()
-        if abs(other - one) >= WORDED * scale_of(shape.body)
-    ]
-    listed = f": {', '.join(changed)} mm" if changed else ""
+    in_mm, without_unit = list[str](), list[str]()
+    for group, (one, other) in shape.sizes.items():
+        words = group.name.replace("_", " ")
+        if group.kind == "ratio":
+            if abs(other - one) >= WORDED_RATIO:
+                without_unit.append(f"{words} {one:.2f} → {other:.2f}")
+        elif abs(other - one) >= WORDED * scale_of(shape.body):
+            in_mm.append(f"{words} {one:.0f} → {other:.0f}")
+    changed = [*([", ".join(in_mm) + " mm"] if in_mm else []), *without_unit]
+    listed = f": {', '.join(changed)}" if changed else ""
     return (
         f"The body's shape was fitted to frames {frames[0]} to {frames[-1]}{listed}; the silhouettes agree by "
         f"{100.0 * shape.overlap[1]:.0f} % (before: {100.0 * shape.overlap[0]:.0f} %). Bone lengths were kept."

@@ -9,7 +9,7 @@ result is a subject with all dimensions, so that every later run of the session 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -19,7 +19,7 @@ from pydantic import Field
 from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
-from studio.body.shape_space import ShapeSpace, levelled, shape_space
+from studio.body.shape_space import Kind, ShapeSpace, levelled, shape_space
 from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject, fit_subject, write_subject
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
@@ -88,7 +88,7 @@ class FittedSize:
     """One group of dimensions, mm: before, after, and the standard deviation of that (`ShapeRefiner.refine`)."""
 
     name: str
-    kind: Literal["length", "radius"]
+    kind: Kind
     dimensions: tuple[str, ...]
     before: float
     after: float

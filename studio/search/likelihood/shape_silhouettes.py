@@ -42,10 +42,12 @@ class ShapePrograms:
     def __init__(self, space: ShapeSpace) -> None:
         """Raises BodyError for a space of dimensions that do not all move something."""
         self.space = space
-        body = space.body
+        names = self._names = [name for group in space.groups for name in group.dimensions]
+        offsets = {name for group in space.groups if group.kind == "offset" for name in group.dimensions}
+        # A move of zero would be left out of the program.
+        away = {name: space.body.dimensions[name] + STEP for name in offsets}
+        body = with_dimensions(space.body, away) if away else space.body
         self._first = compile_program(kinematic_tables(body))
-        names = [name for group in space.groups for name in group.dimensions]
-        self._group = np.repeat(np.arange(len(space.groups)), [len(g.dimensions) for g in space.groups])
         self._own = np.array([body.dimensions[name] for name in names])
         fixed, limbs = list[Array](), list[Array]()
         for name in names:
@@ -62,7 +64,8 @@ class ShapePrograms:
 
     def program(self, shape: Array) -> KinematicProgram:
         """The program of a shape (S,)."""
-        more = self._own * np.expm1(shape[self._group])
+        sizes = self.space.dimensions(shape)
+        more = np.array([sizes[name] for name in self._names]) - self._own
         return self._first._replace(
             fixed=(self._first.fixed + np.tensordot(more, self._fixed, 1)).astype(np.float32),
             limb_shape=np.ascontiguousarray(

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_ends
-from studio.body.model import BodyModel, moving_joint
+from studio.body.model import BodyModel, ends_of, moving_joint
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
@@ -44,6 +44,8 @@ HIDDEN_PULL, REST_PULL = 100.0, 20.0
 """Pull towards the rest pose, mm per radian, of angles that move no limb of their own (collar-bones) and of the others.
 An arm's outline inside the trunk costs nothing, so that without it shoulders sink into the chest (a rendered dance:
 36 mm and limbs lost in 23 of 100 frames without, 20 mm and 1 with it and resampled limbs)."""
+SPREAD_PULL = 15.0
+"""mm that an angle is pulled by at its usual deviation from rest, where the body says one."""
 HALFWAY = 0.5
 SLACK_MM = 50.0
 """mm by which a hand or foot without a joint (`rigid_limbs`) may be off at no cost: a wrist turns it by so much."""
@@ -142,6 +144,8 @@ class Refiner:
         self.slack = np.where(rigid_limbs(body), SLACK_MM, 0.0)
         self.neutral = body.neutral
         self.stiffness = np.where(hidden_angles(body), HIDDEN_PULL**2, REST_PULL**2)
+        usual = np.isfinite(body.spread)
+        self.stiffness[usual] = np.square(SPREAD_PULL / body.spread[usual])
         self.bounded = body.bounded_angles
         self.stiffness[~self.bounded] = 0.0
 
@@ -287,17 +291,8 @@ def free_ends(body: BodyModel) -> NDArray[np.bool_]:
     """(L,) whether a drawn limb's far end is an end of the body (fingers, toes, crown): no limb hangs from it, not even
     one of zero length.
     """
-    parents = [joint.parent for joint in body.joints]
-
-    def above(joint: int) -> set[int]:
-        found: set[int] = set()
-        while parents[joint] >= 0:
-            joint = parents[joint]
-            found.add(joint)
-        return found
-
-    carrying = set[int]().union(*(above(limb.joint) for limb in body.limbs))
-    return np.array([limb.joint not in carrying for limb in body.drawn], dtype=np.bool_)
+    drawn = np.array([limb.length != 0.0 for limb in body.limbs], dtype=np.bool_)
+    return ends_of(body, body.limbs)[drawn]
 
 
 def hidden_angles(body: BodyModel) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from studio.body.forward_kinematics import limb_ends
-from studio.body.shape_space import ShapeSpace
+from studio.body.shape_space import OFFSET_SIGMA, ShapeSpace
 from studio.foundations.arrays import Array
 
 STEP = 1e-4
@@ -35,7 +35,8 @@ class ShapePrior:
 
     def __init__(self, space: ShapeSpace, spreads: ShapeSpreads, height: float | None) -> None:
         is_length = np.array([group.kind == "length" for group in space.groups])
-        self.sigma = np.where(is_length, spreads.length, spreads.radius)
+        of_kind = {"length": spreads.length, "radius": spreads.radius, "offset": OFFSET_SIGMA}
+        self.sigma = np.array([of_kind.get(group.kind, group.spread) for group in space.groups])
         """(S,) standard deviations without the common factor."""
         together = np.where(is_length, spreads.size, 0.0)
         self._precision = np.linalg.inv(np.diag(np.square(self.sigma)) + np.outer(together, together))

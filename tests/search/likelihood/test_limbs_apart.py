@@ -189,3 +189,14 @@ def test_limits_are_inclusive_and_limbs_compared_only_on_request() -> None:
 def test_poses_of_another_body_are_refused() -> None:
     with pytest.raises(BodyError, match="31 parameters"):
         HardPriors(load_body("human31")).hold(np.zeros((2, 30)))
+
+
+def test_limbs_know_what_they_hang_from_where_flesh_lies_beside_the_bone() -> None:
+    mouse, plain = load_body("mouse"), load_body("human34")
+    named = lambda body, pairs: {frozenset(body.drawn[i].name for i in pair) for pair in pairs.limbs}  # noqa: E731
+    # Neighbours overlap at their joint and are not compared, unless one begins outside the other.
+    assert not {frozenset({"left haunch", "rump"}), frozenset({"head", "left ear"})} & named(
+        mouse, limb_pairs(mouse)
+    )
+    person = load_body("human35")
+    assert named(person, limb_pairs(person)) == named(plain, limb_pairs(plain))
