@@ -5,6 +5,7 @@ worked at at the same path, or the right to use the store where it lies: argumen
 do not.
 """
 
+import gc
 import importlib
 import importlib.util
 import os
@@ -14,6 +15,7 @@ import socket
 import tempfile
 import threading
 import time
+import traceback
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Executor, Future, wait
 from contextlib import contextmanager, suppress
@@ -253,11 +255,15 @@ def _connect(address: str, patience: float) -> Any:  # noqa: ANN401 - of a packa
     try:
         return _dask().Client(address, timeout=patience, set_as_default=False, name="capture-studio")
     except (OSError, ValueError, TypeError) as problem:
-        raise RunError(
-            f"The cluster's scheduler at '{address}' does not answer ({_first_line(problem)}).",
-            "Start one with 'dask scheduler' and give the address that it prints, such as tcp://HOST:8786;"
-            f" without --cluster and {VARIABLE} this machine works alone.",
-        ) from None
+        said = _first_line(problem)
+        traceback.clear_frames(problem.__traceback__)
+    # Dask's client that never came up closes itself when it is collected, which hangs while another one starts.
+    gc.collect()
+    raise RunError(
+        f"The cluster's scheduler at '{address}' does not answer ({said}).",
+        "Start one with 'dask scheduler' and give the address that it prints, such as tcp://HOST:8786;"
+        f" without --cluster and {VARIABLE} this machine works alone.",
+    )
 
 
 def _dask() -> Any:  # noqa: ANN401 - loaded only where it is used

@@ -1,5 +1,6 @@
 """Trials as tasks of Dask's workers on this machine: the same results, losses, cancelling, and what can be missing."""
 
+import gc
 import importlib.util
 import os
 import signal
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import dask
 import pytest
-from distributed import LocalCluster
+from distributed import Client, LocalCluster
 from toy_experiments import toy
 from waiting import until
 
@@ -223,6 +224,8 @@ def test_nobody_answers(tmp_path: Path) -> None:
     assert "dask scheduler" in no.value.hint
     with pytest.raises(RunError, match=r"scheduler at 'nowhere://x' does not answer"):
         ClusterExecutor("nowhere://x", tmp_path, patience=0.5)
+    # A client that never came up would close itself whenever it is collected, and hang where another one starts then.
+    assert not [one for one in gc.get_objects() if isinstance(one, Client) and one.status != "closed"]
 
 
 def test_the_scheduler_goes_away(tmp_path: Path) -> None:
