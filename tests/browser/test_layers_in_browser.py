@@ -67,7 +67,7 @@ def test_the_first_frame_shows_the_layers_that_there_are(
 
     # They are found again after a reload, though no frame is finished.
     page.reload()
-    window.until("get('detail')?.frame === 0 && get('detail').layers.length > 0")
+    window.until("get('summary') && get('detail')?.frame === 0 && get('detail').layers.length > 0")
     assert window.get("summary")["frames"] == []  # pyright: ignore[reportIndexIssue]
     done = len(window.get("detail")["layers"])  # pyright: ignore[reportIndexIssue]
     expect(page.locator(f"{TILES}:not(.to-come)")).to_have_count(done)

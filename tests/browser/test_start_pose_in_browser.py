@@ -16,7 +16,7 @@ POSE = "/api/sessions/toy/start-pose"
 def studio(toy_studio: StudioServer) -> StudioServer:
     """The toy arm, whose start pose is a little off."""
     off = true_poses()[0] + np.array([0.12, -0.1, 0.1, -0.08])
-    toy_studio.post(POSE, {"pose": off.tolist()}, "PUT")
+    toy_studio.put(POSE, {"pose": off.tolist()})
     return toy_studio
 
 
