@@ -76,7 +76,9 @@ class ShapeSpace:
     def sizes(self, shape: Array) -> Array:
         """(S,) mm, ratios without a unit: the mean of each group's dimensions."""
         sizes = self.dimensions(shape)
-        means = [sum(sizes[name] for name in group.dimensions) / len(group.dimensions) for group in self.groups]
+        means = [
+            sum(sizes[name] for name in group.dimensions) / len(group.dimensions) for group in self.groups
+        ]
         return np.array(means, dtype=np.float64)
 
 
