@@ -189,7 +189,7 @@ def track_seeds(
         for lost, result in zip(named, results, strict=True):
             lost.append(list(result.limbs_lost))
         report("tracking", number + 1, len(frames))
-    found: list[Tracked] = []
+    tracked: list[Tracked] = []
     for run, lost in zip(runs, named, strict=True):
         poses = np.array(run.poses)
         if settings.refinement.refine_frames:
@@ -205,8 +205,8 @@ def track_seeds(
         by_frame = dict(zip(frames, lost, strict=True))
         impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())
         named_of = [by_frame[frame] for frame in figures.frames]
-        found.append(dataclasses.replace(figures, named=named_of, impossible_frames=impossible))
-    return found
+        tracked.append(dataclasses.replace(figures, named=named_of, impossible_frames=impossible))
+    return tracked
 
 
 def settings_of(trial: TrackingTrial) -> RunSettings:
@@ -327,7 +327,7 @@ def measure_seeds(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str
     """
     trials = [TrackingTrial.of_plain(one) for one in arguments["trials"]]
     try:
-        found = track_seeds(trials[0], [trial.seed for trial in trials], cache)
+        tracked = track_seeds(trials[0], [trial.seed for trial in trials], cache)
     except Exception:
-        found = [track(trial, cache) for trial in trials]
-    return {"measured": [asdict(one) for one in found]}
+        tracked = [track(trial, cache) for trial in trials]
+    return {"measured": [asdict(one) for one in tracked]}

@@ -60,6 +60,7 @@ SCHEMA_VERSION, FOLDER = 1, "shapes"
 WORDED = 5.0
 """mm (of a person: `scale_of`): smaller changes are not reported."""
 WORDED_RATIO = 0.02
+"""Smaller changes of ratios are not reported."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

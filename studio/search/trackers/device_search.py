@@ -181,26 +181,26 @@ class DeviceFilter(DeviceRuns):
         count, is_last = weighed.count, plans[0].noise is None
         step = -(-count // RECORDED)
         poses, values, best = self._rows(weighed.poses, weighed.weights, weighed.annealed, count, step)
-        annealed, found = self._fetched(weighed.annealed), self._fetched(self._moments)
+        annealed, moments = self._fetched(weighed.annealed), self._fetched(self._moments)
         parents = np.zeros((2, 0), dtype=np.int64)
         if not is_last:
             parents = self._fetched(self._memory("parents", (2, self.runs * count), np.int32)).astype(
                 np.int64
             )
         rows = np.arange(0, count, step) if step > 1 else np.zeros(0, dtype=np.int64)
-        kept = found[WEIGHTED + 1]
+        kept = moments[WEIGHTED + 1]
         return [
             LayerRecord(
                 layer=layer,
                 beta=float(annealed[run, BETA]),
                 alpha_wanted=plan.survival,
                 alpha_reached=float(annealed[run, SURVIVAL]),
-                variance_weighed=found[WEIGHED + 1, run],
-                variance_resampled=kept[run] if is_last else found[SURVIVING + 1, run],
-                variance_diffused=kept[run] if is_last else found[DIFFUSED + 1, run],
+                variance_weighed=moments[WEIGHED + 1, run],
+                variance_resampled=kept[run] if is_last else moments[SURVIVING + 1, run],
+                variance_diffused=kept[run] if is_last else moments[DIFFUSED + 1, run],
                 best=best[run],
                 best_log_weight=float(annealed[run, MOST]),
-                mean=found[WEIGHTED, run],
+                mean=moments[WEIGHTED, run],
                 poses=poses[run],
                 log_weights=values[LOG_WEIGHT, run],
                 parents=parents if is_last else parents[:, run * count : (run + 1) * count],

@@ -198,17 +198,17 @@ class DeviceSwarm(DeviceRuns):
         count = weighed.count
         every = -(-count // RECORDED)
         poses, values, best = self._rows(weighed.places, weighed.weights, weighed.standing, count, every)
-        found, standing = self._fetched(self._moments), self._fetched(weighed.standing)
+        moments, standing = self._fetched(self._moments), self._fetched(weighed.standing)
         rows = np.arange(0, count, every) if every > 1 else np.zeros(0, dtype=np.int64)
         return [
             LayerRecord(
                 layer=layer,
-                variance_weighed=found[WEIGHED + 1, run],
-                variance_resampled=found[SURVIVING + 1, run],
-                variance_diffused=found[(SURVIVING if is_last else DIFFUSED) + 1, run],
+                variance_weighed=moments[WEIGHED + 1, run],
+                variance_resampled=moments[SURVIVING + 1, run],
+                variance_diffused=moments[(SURVIVING if is_last else DIFFUSED) + 1, run],
                 best=best[run],
                 best_log_weight=float(standing[run, MOST]),
-                mean=found[WEIGHED, run],
+                mean=moments[WEIGHED, run],
                 poses=poses[run],
                 log_weights=values[weighed.row, run],
                 rows=rows,
