@@ -2,7 +2,7 @@
 
 EM that updates one component at a time. A component's weight is max(0, n_m - N / 2) / Σ_j max(0, n_j - N / 2): n_m
 points support it, N is the number of its parameters; one with too few points for its parameters is annihilated, so that
-no component can collapse onto a few points. When EM has settled, one component is removed and EM continues, down to
+no component can collapse onto a few points. When EM has converged, one component is removed and EM continues, down to
 `least`; the mixture of the shortest message is the result. As it starts from many components throughout the data, it
 is insensitive to the start. Ours differs from the paper in three places, each measured on mixtures with known truth (30
 draws each of three to five components in two and three dimensions):
@@ -13,7 +13,7 @@ draws each of three to five components in two and three dimensions):
     most.
 - The component whose removal costs least likelihood is removed, not the one of the smallest weight: that may be a small
   cluster far from all others, while a large one exists twice.
-- EM has settled when a sweep shortens the message by less than `tolerance` nats a point. A share of the length, which
+- EM has converged when a sweep shortens the message by less than `tolerance` nats a point. A share of the length, which
   may be 0, depends on the points' units.
 """
 
@@ -43,8 +43,8 @@ MOST_SWEEPS = 500
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
-    """One mixture that EM settled at. length : its message length in nats. sweeps : updates of all components."""
+class Converged:
+    """One mixture that EM converged to. length : its message length in nats. sweeps : updates of all components."""
 
     components: int
     length: float
@@ -57,8 +57,8 @@ class Search:
     """Settings of the search for the number of components.
 
     most : components at the start. least : fewest tried. covariance : "full" or "diagonal". tolerance : EM has
-    settled when a sweep changes the message length by less than this, nats a point. patience : components removed in a
-    row without a shorter message before the search ends; 0 goes on to `least`. floor : variances (p,) added to every
+    converged when a sweep changes the message length by less than this, nats a point. patience : components removed in
+    a row without a shorter message before the search ends; 0 goes on to `least`. floor : variances (p,) added to every
     component, beside FLOOR; () for none.
     """
 
@@ -72,22 +72,22 @@ class Search:
 
 def fit_mixture(
     points: Array, rng: np.random.Generator, search: Search, progress: Progress = no_progress
-) -> tuple[GaussianMixture, tuple[Settled, ...]]:
-    """The mixture of the shortest message for points (n, p), and what EM settled at on the way.
+) -> tuple[GaussianMixture, tuple[Converged, ...]]:
+    """The mixture of the shortest message for points (n, p), and what EM converged to on the way.
 
     progress(step in words, components removed, components at the start). Raises BehaviourError where there are too few
     points for one component, values that are not finite, and for an invalid search.
     """
     _check(points, search)
     state = _Components(points, rng, search)
-    best, history, fruitless = None, list[Settled](), 0
+    best, history, fruitless = None, list[Converged](), 0
     while True:
-        sweeps = state.settle(search.tolerance)
-        settled = Settled(state.size, state.message_length(), state.log_likelihood, sweeps)
+        sweeps = state.converge(search.tolerance)
+        reached = Converged(state.size, state.message_length(), state.log_likelihood, sweeps)
         fruitless += 1
-        if best is None or settled.length < min(entry.length for entry in history):
+        if best is None or reached.length < min(entry.length for entry in history):
             best, fruitless = state.mixture(), 0
-        history.append(settled)
+        history.append(reached)
         progress("finding clusters", search.most - state.size, search.most)
         if state.size <= search.least or (search.patience and fruitless >= search.patience):
             return best, tuple(history)
@@ -162,7 +162,7 @@ class _Components:
         shape = 0.5 * self.parameters * float(np.log(support).sum())
         return shape + 0.5 * self.size * math.log(self.count) - self.log_likelihood
 
-    def settle(self, tolerance: float) -> int:
+    def converge(self, tolerance: float) -> int:
         """EM until the message length stays. Returns the number of sweeps."""
         length = math.inf
         for sweep in range(1, MOST_SWEEPS + 1):

@@ -23,7 +23,7 @@ from studio.foundations.geometry.camera_table import CameraTable
 from studio.foundations.numba_in_threads import KERNEL, njit, parallel_blocks
 from studio.foundations.numba_on_devices import cuda, missing
 from studio.search.likelihood.area_kernels import WINDOW_STEP
-from studio.search.likelihood.device_kernels import (
+from studio.search.likelihood.device_weighing_kernels import (
     DRAWN,
     EDGE_SUM,
     FRAME,
@@ -66,9 +66,9 @@ ROWS_A_BLOCK, BLOCKS_A_THREAD = 64, 256
 class FrameOnDevice:
     """The maps of one frame, or of several problems side by side, on the device.
 
-    places : (P, V, 9), see `device_kernels`. values, words : maps and silhouettes. scale : pixels of the silhouettes a
-    pixel of the pictures. observed : (P, V) pixels in the silhouettes, on the host. memory : number of where they lie,
-    the same for frames that take turns in one place.
+    places : (P, V, 9), see `device_weighing_kernels`. values, words : maps and silhouettes. scale : pixels of the
+    silhouettes a pixel of the pictures. observed : (P, V) pixels in the silhouettes, on the host. memory : number of
+    where they lie, the same for frames that take turns in one place.
     """
 
     places: Any

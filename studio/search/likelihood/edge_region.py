@@ -17,7 +17,7 @@ any finite pose. Leaving such samples out instead, as the benchmark does, reward
 doing so is small: with all four Lee-walk pictures cut off below the hips the best root position moves by 20
 mm.
 
-**On a device.** `device` has the poses weighed on a graphics card (`device_weighing`; `device_kernels` says
+**On a device.** `device` has the poses weighed on a graphics card (`device_weighing`; `device_weighing_kernels` says
 how equal the sums are). With `auto` a card that is not there, or that fails in compiling or launching a kernel, leaves
 the work to the processor, and a frame's notes say why, once.
 

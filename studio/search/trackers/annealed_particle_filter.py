@@ -29,17 +29,17 @@ from studio.search.trackers.diffusion import (
     proportional_noise,
     shrunk_noise,
 )
-from studio.search.trackers.guided_particles import STATES, foreseen, is_guided
-from studio.search.trackers.guided_start import arrived, descended, guided_set, settled_set
+from studio.search.trackers.guided_particles import STATES, foresee, is_guided
+from studio.search.trackers.guided_start import arrived, constrain_set, descended, guided_set
 from studio.search.trackers.layer_plan import LayerPlan, Noise
 from studio.search.trackers.layer_record import layer_record
-from studio.search.trackers.model_free import judged, share_in
+from studio.search.trackers.model_free import compare_kinds, share_in
 from studio.search.trackers.particle_kernels import Moments, moments
 from studio.search.trackers.particles import (
     ParticleFilter,
-    expected,
+    constrain_drawn,
     first_set,
-    settle,
+    predict,
     uniform_poses,
     unweighted,
     weigh,
@@ -89,7 +89,7 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         carried = _carried(numbers, previous.particles, settings)
         if is_guided(space, settings.prediction):
             return guided_set(numbers, previous, carried, space, settings)
-        predicted = expected(previous.particles.poses[carried], previous, settings.dynamics)
+        predicted = predict(previous.particles.poses[carried], previous, settings.dynamics)
         return first_set(numbers, predicted, space, settings)
 
     def step_layer(
@@ -104,9 +104,9 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         """Steps 3 to 5: weigh (Eq. 3, 6, 11, 12), draw, cross (Eq. 19) and spread (Eq. 7, 13 or 18)."""
         guided = STATES in particles.extra
         if layer == 0:
-            particles = settled_set(numbers, particles, problem, space, settings)
+            particles = constrain_set(numbers, particles, problem, space, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
-        free, extra = share_in(particles.extra), judged(particles.extra, eligible)
+        free, extra = share_in(particles.extra), compare_kinds(particles.extra, eligible)
         survival = layer_survivals(settings, layer + 1)[-1]
         annealed = anneal(eligible, survival)
         weighted = ParticleSet(particles.poses, annealed.log_weights, raw, extra)
@@ -121,7 +121,7 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         survivors, first, second = _survivors(numbers, weighted, space, settings)
         of_survivors = moments(survivors)
         spread = _spread(survivors, of_survivors, layer, space, settings)
-        poses = settle(numbers, spread, spread.draw(numbers), survivors, problem, space, settings)
+        poses = constrain_drawn(numbers, spread, spread.draw(numbers), survivors, problem, space, settings)
         record = layer_record(
             layer,
             weighted,
@@ -145,8 +145,8 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         return LayerPlan(survival, noise, crossed=settings.crossover)
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Array:
-        """(S, D) poses that the first layer's set expects: one unless a behaviour model guides it (`foreseen`)."""
-        return foreseen(particles, space)
+        """(S, D) poses that the first layer's set expects: one unless a behaviour model guides it (`foresee`)."""
+        return foresee(particles, space)
 
 
 def _carried(numbers: RandomNumbers, last: ParticleSet, settings: AnnealedSettings) -> Indices:

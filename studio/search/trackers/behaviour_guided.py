@@ -21,9 +21,9 @@ import numpy as np
 
 from studio.foundations.arrays import Array
 from studio.search.trackers.annealing import Annealed, anneal, at_exponent
-from studio.search.trackers.guided_particles import foreseen, spread_over_clusters
+from studio.search.trackers.guided_particles import foresee, spread_over_clusters
 from studio.search.trackers.guided_start import guided_set, without_past
-from studio.search.trackers.model_free import judged
+from studio.search.trackers.model_free import compare_kinds
 from studio.search.trackers.one_layer_filter import OneLayerFilter
 from studio.search.trackers.paper_presets import CAILLETTE
 from studio.search.trackers.particles import first_set, uniform_poses, unweighted
@@ -62,13 +62,13 @@ class BehaviourGuided(OneLayerFilter[BehaviourSettings]):
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: BehaviourSettings) -> Array:
         """(S, D) means of the clusters that hold enough particles, at their mean root (section 6.3)."""
-        return foreseen(particles, space, settings.expected_support, settings.expected_most)
+        return foresee(particles, space, settings.expected_support, settings.expected_most)
 
     def selected(
         self, log_weights: Array, extra: Arrays, settings: BehaviourSettings
     ) -> tuple[Annealed, float, Arrays]:
         """The weights at the peakedness that the settings select."""
-        extra = without_past(judged(extra, log_weights))
+        extra = without_past(compare_kinds(extra, log_weights))
         if settings.selection == "survival":
             return anneal(log_weights, settings.survival), settings.survival, extra
         return at_exponent(log_weights, 1.0), math.nan, extra

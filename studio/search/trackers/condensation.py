@@ -17,7 +17,7 @@ from studio.foundations.arrays import Array
 from studio.search.trackers.annealing import Annealed, anneal, at_exponent
 from studio.search.trackers.layer_plan import LayerPlan
 from studio.search.trackers.one_layer_filter import OneLayerFilter
-from studio.search.trackers.particles import expected, first_set, uniform_poses, unweighted
+from studio.search.trackers.particles import first_set, predict, uniform_poses, unweighted
 from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.resampling import draw
 from studio.search.trackers.settings import CondensationSettings
@@ -46,7 +46,7 @@ class Condensation(OneLayerFilter[CondensationSettings]):
         if last is None:
             return unweighted(uniform_poses(numbers, settings.particles, space))
         drawn = draw(numbers, np.exp(last.log_weights), settings.particles, settings.resampling)
-        predicted = expected(last.poses[drawn], previous, settings.dynamics)
+        predicted = predict(last.poses[drawn], previous, settings.dynamics)
         first = first_set(numbers, predicted, space, settings)
         return ParticleSet(first.poses, first.log_weights, extra=last.extra | first.extra)
 

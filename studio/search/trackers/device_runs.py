@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from studio.foundations.arrays import Array
 from studio.foundations.numba_on_devices import cuda, record_launches
 from studio.search.likelihood.device_weighing import WeighingDevice
-from studio.search.trackers import device_kernels, device_swarm_kernels
-from studio.search.trackers.device_kernels import MOMENTS
+from studio.search.trackers import device_search_kernels, device_swarm_kernels
+from studio.search.trackers.device_search_kernels import MOMENTS
 from studio.search.trackers.tracker import SearchSpace
 
 THREADS = 128
@@ -27,7 +27,7 @@ FIRST_TIME, SECOND_TIME, ONE_BY_ONE = "first time", "second time", "one by one"
 @functools.cache
 def kernel(name: str) -> Any:  # noqa: ANN401 - Numba's
     """A kernel of filters or swarms, compiled by its first launch in a process."""
-    return cuda.jit({**vars(device_kernels), **vars(device_swarm_kernels)}[name])
+    return cuda.jit({**vars(device_search_kernels), **vars(device_swarm_kernels)}[name])
 
 
 class Moment(NamedTuple):

@@ -20,7 +20,8 @@ from studio.search.likelihood.device_weighing import (
     ProblemOnDevice,
     WeighingDevice,
 )
-from studio.search.trackers.device_kernels import (
+from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Moment, kernel, limits_there
+from studio.search.trackers.device_search_kernels import (
     ANNEALED,
     BETA,
     CORRELATED,
@@ -40,7 +41,6 @@ from studio.search.trackers.device_kernels import (
     WEIGHED,
     WEIGHTED,
 )
-from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Moment, kernel, limits_there
 from studio.search.trackers.layer_plan import LayerPlan, Noise
 from studio.search.trackers.particle_kernels import places
 from studio.search.trackers.particles import ParticleFilter

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from studio.foundations.arrays import Array
 from studio.search.likelihood.device_weighing import ProblemOnDevice, WeighingDevice
 from studio.search.likelihood.problem import TRUNK_FIRST
-from studio.search.trackers.device_kernels import (
+from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Moment, kernel, limits_there
+from studio.search.trackers.device_search_kernels import (
     DIFFUSED,
     MOST,
     SUMMING,
     SURVIVING,
     WEIGHED,
 )
-from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Moment, kernel, limits_there
 from studio.search.trackers.device_swarm_kernels import (
     MOVING,
     POSSIBLE,
@@ -48,7 +48,7 @@ from studio.search.trackers.particle_swarm import (
     ParticleSwarm,
     acceleration,
     constriction,
-    expected_pose,
+    predict_pose,
     seen_in,
 )
 from studio.search.trackers.particles import unweighted
@@ -316,7 +316,7 @@ class DeviceSearch:
         """Sample the first stage's swarms about x̂."""
         first = stages_of(self._spaces[0].hierarchy, settings)[0]
         self._freedom = first.freedom
-        starts = np.array([expected_pose(one, settings) for one in previous])
+        starts = np.array([predict_pose(one, settings) for one in previous])
         moments = [Moment(*one.key) for one in numbers]
         samples = self._sampling(settings)
         self._set = self._swarm.sample(starts, moments, first.particles, samples, settings.constraints)

@@ -1,10 +1,10 @@
 # pyright: standard
 """What an iteration of a swarm does with its particles, on a CUDA device, for many runs side by side.
 
-As in `device_kernels`, R runs have N particles each, particle n of run r is column r N + n of places and velocities
-(D, R N), single precision, and random numbers are counted. p_i are bests (D, R N) with reached (2, R N), rows VALUE and
-POSSIBLE; p_g are leaders (D, R) with standing (R, 5), columns VALUE, POSSIBLE and, of the last weighing, MOST, its best
-value, and BEST, the particle that has it. Symbols and equations are those of `particle_swarm`.
+As in `device_search_kernels`, R runs have N particles each, particle n of run r is column r N + n of places and
+velocities (D, R N), single precision, and random numbers are counted. p_i are bests (D, R N) with reached (2, R N),
+rows VALUE and POSSIBLE; p_g are leaders (D, R) with standing (R, 5), columns VALUE, POSSIBLE and, of the last weighing,
+MOST, its best value, and BEST, the particle that has it. Symbols and equations are those of `particle_swarm`.
 """
 
 import math
@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from studio.foundations.numba_on_devices import cuda
+from studio.search.trackers.constraints import MOST_REDRAWS
 from studio.search.trackers.counted_numbers import (
     OF_TRIES,
     OF_TRY,
@@ -20,12 +21,11 @@ from studio.search.trackers.counted_numbers import (
     as_share,
     random_words,
 )
-from studio.search.trackers.device_kernels import BEST, FRAME, LAYER, MOST, SEED, SUMMING
-from studio.search.trackers.hard_priors import MOST_REDRAWS
+from studio.search.trackers.device_search_kernels import BEST, FRAME, LAYER, MOST, SEED, SUMMING
 
 VALUE, POSSIBLE = 0, 1
 STANDING = 5
-"""Numbers of a run; column 3 is not used, so that MOST and BEST are those of `device_kernels`."""
+"""Numbers of a run; column 3 is not used, so that MOST and BEST are those of `device_search_kernels`."""
 PULL, SHRINK, MOVING, SIGMA = range(4)
 """Dials of a run (R, 3 + D): c = c1 = c2, χ, whether a sampled swarm has velocities, the first of the σ (D,)."""
 NOBODY = -1.0

@@ -156,7 +156,7 @@ class FrameRefiner:
 
 
 class _Prepared(NamedTuple):
-    """What judges and refines poses in some cameras."""
+    """What refines poses in some cameras, and says how far they are off."""
 
     refiner: Refiner
     redrawing: Refiner
@@ -183,17 +183,17 @@ class SeenFrame:
 
     def hypothesis(self, pose: Array) -> Hypothesis:
         """Loss and disagreement of a pose (D,), not refined."""
-        loss = self.refiner.settled_loss(pose, self.silhouettes)
+        loss = self.refiner.loss_with_pull(pose, self.silhouettes)
         return Hypothesis(pose, loss, self.agreement.of(pose, self.silhouettes))
 
-    def settled(self, found: Hypothesis) -> Hypothesis:
+    def refine(self, refined: Hypothesis) -> Hypothesis:
         """The hypothesis refined further."""
-        return self.hypothesis(self.refiner.refine(found.pose, self.silhouettes).pose)
+        return self.hypothesis(self.refiner.refine(refined.pose, self.silhouettes).pose)
 
     def better(self, than: Hypothesis, start: Array) -> Hypothesis:
         """The hypothesis refined from a start (D,), if that is clearly better than `than`; else `than`."""
         pose = self.refiner.refine(start, self.silhouettes).pose
-        if self.refiner.settled_loss(pose, self.silhouettes) >= BETTER * than.loss:
+        if self.refiner.loss_with_pull(pose, self.silhouettes) >= BETTER * than.loss:
             return than
         return self.hypothesis(pose)
 
@@ -233,7 +233,7 @@ def redrawn(
     if shares[limb] > LIMB_LOST_SHARE:
         found, more = _both_redrawn(rng, found, frame, limb)
         evaluations += more
-    return found if found is began_with else frame.settled(found), evaluations
+    return found if found is began_with else frame.refine(found), evaluations
 
 
 def _both_redrawn(

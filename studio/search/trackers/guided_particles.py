@@ -10,8 +10,8 @@ state is recomputed: the model's label of its pose and movement is taken as the 
 sequences are read (`followed`).
 
 In the first frame of a run nothing has moved yet: there is noise only, and a particle's state and movement are drawn
-from the clusters near its pose (`near`): the probability of each cluster given the angles, its movement unknown, then
-the movement given cluster and angles. The state's history is then only that cluster.
+from the clusters near its pose (`draw_near`): the probability of each cluster given the angles, its movement unknown,
+then the movement given cluster and angles. The state's history is then only that cluster.
 """
 
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ def walkers_from(
     if STATES in carried:
         return GuidedParticles(poses, carried[STATES][rows], carried[VELOCITY][rows], free)
     if previous.estimate is None or previous.previous_estimate is None:
-        return GuidedParticles(poses, *near(rng, poses, space), free)
+        return GuidedParticles(poses, *draw_near(rng, poses, space), free)
     columns = columns_of(space)
     movement = (previous.estimate - previous.previous_estimate)[columns] / space.steps
     velocity = np.tile(movement, (len(poses), 1))
@@ -135,7 +135,7 @@ def followed(
     return np.where(stepping, model.automaton.next_state[states, labels], states)
 
 
-def near(rng: np.random.Generator, poses: Array, space: SearchSpace) -> tuple[Indices, Array]:
+def draw_near(rng: np.random.Generator, poses: Array, space: SearchSpace) -> tuple[Indices, Array]:
     """States (N,) and movements (N, d) drawn from the clusters near poses (N, D), their movement unknown."""
     model = model_of(space)
     angles = poses[:, model.space.columns]
@@ -171,7 +171,7 @@ def spread_over_clusters(
     return unweighted(poses, carried)
 
 
-def foreseen(particles: ParticleSet, space: SearchSpace, support: float = 0.05, most: int = 4) -> Array:
+def foresee(particles: ParticleSet, space: SearchSpace, support: float = 0.05, most: int = 4) -> Array:
     """(S, D) poses that a set expects: the means of the clusters that hold at least a share `support` of its particles,
     the fullest first, `most` at most, at the particles' mean root (section 6.3). Never empty: where no cluster has so
     many the fullest is taken, and without a model the set's own mean.

@@ -1,7 +1,7 @@
 """A frame's first set, predicted by a behaviour model, with a share of model-free particles.
 
 Whether a pose is possible for the body is known only with the frame's problem. So the set keeps what its particles
-came from, and `settled_set` then redraws impossible ones from the same past, each by its own rule: by the model, or
+came from, and `constrain_set` then redraws impossible ones from the same past, each by its own rule: by the model, or
 by noise.
 """
 
@@ -10,20 +10,20 @@ from dataclasses import replace
 import numpy as np
 
 from studio.foundations.arrays import Array, Indices
+from studio.search.trackers.constraints import Proposals, constrain
 from studio.search.trackers.guided_particles import (
     STATES,
     VELOCITY,
     GuidedParticles,
     columns_of,
+    draw_near,
     followed,
     model_of,
-    near,
     propagated,
     walkers_from,
 )
-from studio.search.trackers.hard_priors import Proposals, settled
 from studio.search.trackers.model_free import BEATEN, FREE, chosen_free, share_of
-from studio.search.trackers.particles import CAME_FROM, first_set, settled_first, unweighted
+from studio.search.trackers.particles import CAME_FROM, constrain_first, first_set, unweighted
 from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.shared_knobs import GuidedSettings, SearchSettings
 from studio.search.trackers.tracker import Arrays, FilterState, FrameLikelihood, ParticleSet, SearchSpace
@@ -43,7 +43,7 @@ def guided_set(
     assert previous.particles is not None
     if previous.estimate is None:
         first = first_set(numbers, previous.particles.poses[rows], space, rules)
-        return replace(first, extra=first.extra | _found_near(numbers.in_turn, first.poses, space))
+        return replace(first, extra=first.extra | _draw_near(numbers.in_turn, first.poses, space))
     share = share_of(rules.model_free_share, rules.model_free_grows, previous.particles.extra)
     rng = numbers.in_turn
     free = chosen_free(rng, len(rows), share)
@@ -55,7 +55,7 @@ def guided_set(
     return following
 
 
-def settled_set(
+def constrain_set(
     numbers: RandomNumbers,
     particles: ParticleSet,
     problem: FrameLikelihood,
@@ -70,8 +70,8 @@ def settled_set(
         return particles
     extra, sigma = particles.extra, space.sigma * rules.diffusion_scale
     if CAME_FROM_STATES not in extra or not isinstance(rules, GuidedSettings):
-        first = settled_first(numbers, particles, problem, space, rules)
-        found = _found_near(numbers.in_turn, first.poses, space) if STATES in extra else {}
+        first = constrain_first(numbers, particles, problem, space, rules)
+        found = _draw_near(numbers.in_turn, first.poses, space) if STATES in extra else {}
         return replace(first, extra=first.extra | found)
     past = GuidedParticles(extra[CAME_FROM], extra[CAME_FROM_STATES], extra[CAME_FROM_VELOCITY], extra[FREE])
     first = GuidedParticles(particles.poses, extra[STATES], extra[VELOCITY], extra[FREE])
@@ -79,7 +79,7 @@ def settled_set(
     def again(rows: Indices, _attempt: int) -> Proposals:
         return _packed(propagated(numbers.in_turn, past.at(rows), space, rules, sigma))
 
-    done = settled(problem, space, rules, _packed(first), past.poses, again)
+    done = constrain(problem, space, rules, _packed(first), past.poses, again)
     states = done.velocities[:, -1].astype(np.int64) - 1
     found = {STATES: np.where(states < 0, past.states, states), VELOCITY: done.velocities[:, :-1].copy()}
     return ParticleSet(done.poses, particles.log_weights, extra=extra | found)
@@ -109,16 +109,16 @@ def arrived(rng: np.random.Generator, poses: Array, extra: Arrays, space: Search
     the clusters near the pose.
     """
     if CAME_FROM_STATES not in extra:
-        return without_past(extra) | _found_near(rng, poses, space)
+        return without_past(extra) | _draw_near(rng, poses, space)
     columns = columns_of(space)
     velocity = (poses - extra[CAME_FROM])[:, columns] / space.steps
     states = followed(rng, model_of(space), extra[CAME_FROM_STATES], poses[:, columns], velocity, space.steps)
     return without_past(extra) | {STATES: states, VELOCITY: velocity}
 
 
-def _found_near(rng: np.random.Generator, poses: Array, space: SearchSpace) -> Arrays:
+def _draw_near(rng: np.random.Generator, poses: Array, space: SearchSpace) -> Arrays:
     """States and movements from the clusters near poses (N, D)."""
-    states, velocity = near(rng, poses, space)
+    states, velocity = draw_near(rng, poses, space)
     return {STATES: states, VELOCITY: velocity}
 
 

@@ -14,9 +14,9 @@ from studio.search.trackers.guided_particles import (
     STATES,
     VELOCITY,
     columns_of,
+    draw_near,
     followed,
     model_of,
-    near,
     propagated,
     walkers_from,
 )
@@ -73,7 +73,7 @@ def leader_arrived(rng: np.random.Generator, leader: Array, extra: Arrays, space
         name: values for name, values in extra.items() if name not in (BEFORE, BEFORE_STATE, STATES, VELOCITY)
     }
     if BEFORE not in extra:
-        states, velocity = near(rng, leader[None], space)
+        states, velocity = draw_near(rng, leader[None], space)
         return kept | {LEADER_STATE: states, LEADER_VELOCITY: velocity}
     columns = columns_of(space)
     velocity = (leader - extra[BEFORE])[:, columns] / space.steps

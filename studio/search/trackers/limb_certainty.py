@@ -101,8 +101,8 @@ class CertaintyOfLimbs:
         self._body, self._unit, self._scale = body, refiner.unit, scale_of(body)
         names, rigid = np.array(limb_names(body)), rigid_limbs(body)
         alone = np.array([bool(rigid[names == name].all()) for name in names])
-        self._judged = np.flatnonzero(~rigid | alone)
-        self._owners = names[self._judged]
+        self._measured = np.flatnonzero(~rigid | alone)
+        self._owners = names[self._measured]
         self._limbs = tuple(dict.fromkeys(names.tolist()))
         reach = (refiner.upper - refiner.lower) / refiner.unit
         self._prior = np.diag(np.where(np.isfinite(reach), RANGE_SHARE * reach, FREE) ** -2.0)
@@ -113,7 +113,7 @@ class CertaintyOfLimbs:
         """
         size, ahead = len(pose), STEP * np.diag(self._unit)
         poses = np.concatenate([pose[None], pose + ahead, pose - ahead])
-        ends = limb_ends(self._body, poses)[:, self._judged] / self._scale
+        ends = limb_ends(self._body, poses)[:, self._measured] / self._scale
         slopes = ((ends[1 : size + 1] - ends[size + 1 :]) / (2.0 * STEP)).reshape(size, -1)
         covariance = np.linalg.inv(matrix / RESIDUAL_MM**2 + self._prior)
         variances = np.einsum("dp,dp->p", slopes, covariance @ slopes).reshape(ends.shape[1:]).sum(axis=2)
@@ -125,5 +125,5 @@ class CertaintyOfLimbs:
         return Certainty(self._limbs, self._largest(np.sqrt(variances).max(axis=1)), jump, moved)
 
     def _largest(self, values: Array) -> Array:
-        """(G,) the largest of each limb's values (K,), one a judged limb."""
+        """(G,) the largest of each limb's values (K,), one a limb that is measured."""
         return np.array([values[self._owners == limb].max() for limb in self._limbs])

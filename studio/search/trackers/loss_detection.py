@@ -17,7 +17,7 @@ Measured with the annealed filter, 1000 evaluations, on rendered footage: the tw
 seen by three cameras at 20 Hz, the bundled walk; masks by subtraction. Tracked: frames with a mean marker error below
 100 mm of a run that starts from the truth. Lost: frames with more than 150 mm of runs that start from another frame's
 pose or 250 to 700 mm aside; found: those with less than 60 mm. Turned: of runs that start back to front. Each is
-judged as one frame alone; a run believes three in a row.
+taken as a frame alone; a run believes three in a row.
 
     weighting                tracked: called lost   lost: missed   found: called lost   turned: called lost
     edge-region                     233: 0             156: 7           43: 0                60: 22
@@ -70,13 +70,13 @@ BLANK_SPREAD, BLANK_STEP = 4.0, 8
 @dataclass(frozen=True, slots=True)
 class Sight:
     """Agreement of a frame's pose with the evidence. overlap : mean f_s over the views, NaN where there are no masks.
-    seen : whether there is anything to track. judged_lost : the weighting's own verdict, where it has one. notes : of
-    cameras that say nothing of the pose, a sentence each kind.
+    seen : whether there is anything to track. called_lost : whether the likelihood itself says that it is lost. notes :
+    of cameras that say nothing of the pose, a sentence each kind.
     """
 
     overlap: float
     seen: bool
-    judged_lost: bool = False
+    called_lost: bool = False
     notes: tuple[str, ...] = ()
 
 
@@ -107,10 +107,10 @@ class Onlooker:
         notes = (*_noted("The picture of {} is blank.", names[blank]),)
         notes += (*_noted("Nothing stands out in {}.", names[empty & ~blank]),)
         if blank.all():
-            return lambda _: Sight(float("nan"), seen=False, judged_lost=lost, notes=notes)
+            return lambda _: Sight(float("nan"), seen=False, called_lost=lost, notes=notes)
         if carved and empty.all():
             nothing = isinstance(problem, QualityMeasured) and problem.quality == -np.inf
-            return lambda _: Sight(float("nan"), seen=not nothing, judged_lost=lost, notes=notes)
+            return lambda _: Sight(float("nan"), seen=not nothing, called_lost=lost, notes=notes)
         silhouettes, projector = silhouettes_of(evidence, HALF), self._projector(cameras)
 
         def sight(pose: Array) -> Sight:
@@ -122,7 +122,7 @@ class Onlooker:
             behind = (outlines[0, :, :, SEEN] < 0.0).all(axis=1)
             said = (*notes, *_noted("The pose is out of sight of {}.", names[behind]))
             seen = bool((shown & (areas.observed > 0)).any())
-            return Sight(overlap, seen, judged_lost=lost, notes=said)
+            return Sight(overlap, seen, called_lost=lost, notes=said)
 
         return sight
 
@@ -145,7 +145,7 @@ class WeightWatch:
 
     def is_lost(self, log_weight: float, sight: Sight) -> bool:
         """Whether a frame's best pose is off the body."""
-        if sight.judged_lost or sight.overlap < LEAST_OVERLAP:
+        if sight.called_lost or sight.overlap < LEAST_OVERLAP:
             return True
         limit = self._limit
         if len(self._overlaps) >= FEWEST and sight.overlap < OVERLAP_SHARE * float(np.median(self._overlaps)):

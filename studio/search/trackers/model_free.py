@@ -46,8 +46,9 @@ def chosen_free(rng: np.random.Generator, count: int, share: float) -> Mask:
     return free
 
 
-def judged(extra: Arrays, log_weights: Array) -> Arrays:
-    """A weighed first set's arrays with b brought up to date. log_weights : (N,) log w, -inf where rejected.
+def compare_kinds(extra: Arrays, log_weights: Array) -> Arrays:
+    """A weighed first set's arrays with b brought up to date by both kinds' weights. log_weights : (N,) log w, -inf
+    where rejected.
 
     Unchanged where the set is all of one kind.
     """

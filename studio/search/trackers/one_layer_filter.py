@@ -4,7 +4,7 @@ from abc import abstractmethod
 
 from studio.foundations.arrays import Array
 from studio.search.trackers.annealing import Annealed
-from studio.search.trackers.guided_start import settled_set
+from studio.search.trackers.guided_start import constrain_set
 from studio.search.trackers.layer_record import layer_record
 from studio.search.trackers.model_free import share_in
 from studio.search.trackers.particles import ParticleFilter, Searching, weigh, weighted_variance
@@ -27,7 +27,7 @@ class OneLayerFilter(ParticleFilter[Searching]):
         space: SearchSpace,
         settings: Searching,
     ) -> tuple[ParticleSet, LayerRecord]:
-        particles = settled_set(numbers, particles, problem, space, settings)
+        particles = constrain_set(numbers, particles, problem, space, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
         chosen, wanted, extra = self.selected(eligible, particles.extra, settings)
         weighted = ParticleSet(particles.poses, chosen.log_weights, raw, extra)

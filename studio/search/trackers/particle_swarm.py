@@ -11,7 +11,7 @@ starts from.
 
 Where the paper leaves a choice: k = 1 is the swarm as it was sampled, so that N iterations weigh N times the
 particles, which is how Table 1 adds up to 1000. p_g is updated after every iteration, not after every particle, so
-that a swarm is weighed at once. Poses that the body cannot take: see `hard_priors`; where such a particle is weighed
+that a swarm is weighed at once. Poses that the body cannot take: see `constraints`; where such a particle is weighed
 all the same, a possible pose is always better than an impossible one. Without a start pose the first stage is
 spread over the limits and moves everything, as there is nothing yet that could be kept.
 
@@ -29,13 +29,13 @@ from numpy.typing import NDArray
 
 from studio.foundations.arrays import Array, Indices
 from studio.search.likelihood.problem import WHOLE_BODY
+from studio.search.trackers.constraints import Mask, Proposals, constrain, possible
 from studio.search.trackers.counted_numbers import OF_VELOCITIES
-from studio.search.trackers.guided_particles import foreseen, is_guided
+from studio.search.trackers.guided_particles import foresee, is_guided
 from studio.search.trackers.guided_swarm import BEFORE, handed_on, leader_arrived, predicted_starts
-from studio.search.trackers.hard_priors import Mask, Proposals, possible, settled
-from studio.search.trackers.model_free import FREE, judged, share_in
+from studio.search.trackers.model_free import FREE, compare_kinds, share_in
 from studio.search.trackers.particle_kernels import moments
-from studio.search.trackers.particles import checked_values, expected, uniform_poses, unweighted
+from studio.search.trackers.particles import checked_values, predict, uniform_poses, unweighted
 from studio.search.trackers.partitions import Stage, evaluations, layer_count, moment_of, stages_of
 from studio.search.trackers.random_numbers import RandomNumbers, place_of_try
 from studio.search.trackers.swarm_settings import PRESETS, VARIANTS, SwarmSettings
@@ -120,7 +120,7 @@ class ParticleSwarm(Tracker[SwarmSettings]):
             drawn = Proposals(spread, _start_velocities(numbers, len(spread), sigma, settings))
             return _new_swarm(drawn, spread.mean(axis=0), freedom)
         sigma = space.sigma * settings.diffusion_scale * first.freedom
-        starts, arrays = expected_pose(previous, settings), {}
+        starts, arrays = predict_pose(previous, settings), {}
         if is_guided(space, settings.prediction) and previous.estimate is not None:
             pose = previous.estimate
             starts, arrays = predicted_starts(
@@ -143,13 +143,13 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         now = moment_of(stages, layer)
         stage = stages[now.number]
         if layer == 0:
-            particles = _kept_possible(numbers.beginning, particles, problem, space, settings)
+            particles = _constrain_sampled(numbers.beginning, particles, problem, space, settings)
         seen = seen_in(stage, particles.extra[FREEDOM])
         values = checked_values(problem.fitness(particles.poses, seen), len(particles.poses))
         allowed = possible(problem, particles.poses, settings)
         free, extra = share_in(particles.extra), _with_bests(particles, values, allowed)
         if FREE in extra:
-            extra = judged(extra, np.where(allowed, values, -np.inf) if allowed.any() else values)
+            extra = compare_kinds(extra, np.where(allowed, values, -np.inf) if allowed.any() else values)
             del extra[FREE]
         weighed = ParticleSet(particles.poses, particles.log_weights, values, extra)
         if now.iteration < stage.iterations:
@@ -171,8 +171,8 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         return limits_alone and FREE not in extra and not is_guided(space, settings.prediction)
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Array:
-        """(S, D) poses that the first stage's swarm expects: one unless a behaviour model guides it (`foreseen`)."""
-        return foreseen(particles, space)
+        """(S, D) poses that the first stage's swarm expects: one unless a behaviour model guides it (`foresee`)."""
+        return foresee(particles, space)
 
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Estimate:
         """p_g of the last stage, or the mean of its p_i."""
@@ -181,7 +181,7 @@ class ParticleSwarm(Tracker[SwarmSettings]):
         return Estimate(pose, mean, leader, float(particles.extra[LEADER_VALUE][0]))
 
 
-def expected_pose(previous: FilterState, settings: SwarmSettings) -> Array:
+def predict_pose(previous: FilterState, settings: SwarmSettings) -> Array:
     """(D,) x̂ of a frame: the pose that the last one reported, in a repeated search p_g, in a run's first the start
     pose; moved on at constant velocity where the settings say so.
     """
@@ -192,7 +192,7 @@ def expected_pose(previous: FilterState, settings: SwarmSettings) -> Array:
         pose = last.extra[LEADER]
     if pose is None:
         pose = last.poses[int(np.argmax(last.log_weights))]
-    return expected(pose[None], previous, settings.dynamics)[0]
+    return predict(pose[None], previous, settings.dynamics)[0]
 
 
 def seen_in(stage: Stage, freedom: Array) -> int:
@@ -234,7 +234,7 @@ def _moved(
         velocities = np.minimum(np.maximum(velocities, -limit), limit)
         return Proposals(places[rows] + velocities, velocities)
 
-    done = settled(problem, space, settings, proposed(np.arange(len(places)), 0), places, proposed)
+    done = constrain(problem, space, settings, proposed(np.arange(len(places)), 0), places, proposed)
     return ParticleSet(done.poses, swarm.log_weights, extra=extra | {VELOCITIES: done.velocities})
 
 
@@ -250,17 +250,17 @@ def _next_swarm(
     start, sigma = extra[LEADER], space.sigma * settings.diffusion_scale * stage.freedom
     drawn = _sampled(numbers, start, sigma, stage.particles, settings)
     sampled = _new_swarm(drawn, start, stage.freedom, handed_on(extra))
-    return _kept_possible(numbers, sampled, problem, space, settings)
+    return _constrain_sampled(numbers, sampled, problem, space, settings)
 
 
-def _kept_possible(
+def _constrain_sampled(
     numbers: RandomNumbers,
     swarm: ParticleSet,
     problem: FrameLikelihood,
     space: SearchSpace,
     settings: SwarmSettings,
 ) -> ParticleSet:
-    """A sampled swarm after the hard priors."""
+    """A sampled swarm with the constraints kept."""
     starts = np.broadcast_to(swarm.extra[START], swarm.poses.shape)
     velocities = swarm.extra[VELOCITIES]
     sigma = space.sigma * settings.diffusion_scale * swarm.extra[FREEDOM]
@@ -273,7 +273,7 @@ def _kept_possible(
     drawn = Proposals(swarm.poses, velocities)
     # An impossible prediction is replaced by where the swarm was before.
     before = np.broadcast_to(swarm.extra[BEFORE], starts.shape) if FREE in swarm.extra else starts
-    done = settled(problem, space, settings, drawn, before, again)
+    done = constrain(problem, space, settings, drawn, before, again)
     return unweighted(
         done.poses, swarm.extra | {VELOCITIES: done.velocities, BEST_POSES: np.array(done.poses)}
     )

@@ -6,8 +6,8 @@ import numpy as np
 
 from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError
+from studio.search.trackers.constraints import Proposals, constrain, possible
 from studio.search.trackers.diffusion import Spread, noise_about
-from studio.search.trackers.hard_priors import Proposals, possible, settled
 from studio.search.trackers.layer_plan import LayerPlan
 from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.shared_knobs import SearchSettings
@@ -47,8 +47,8 @@ def uniform_poses(numbers: RandomNumbers, count: int, space: SearchSpace) -> Arr
     return space.lower + numbers.shares(count, len(space.names)) * (space.upper - space.lower)
 
 
-def expected(poses: Array, previous: FilterState, dynamics: str) -> Array:
-    """Poses (N, D) predicted for the next frame: f of Eq. 10.
+def predict(poses: Array, previous: FilterState, dynamics: str) -> Array:
+    """Predict poses (N, D) for the next frame: f of Eq. 10.
 
     dynamics : "none" leaves them; "constant_velocity" adds the last movement of the reported pose, once there
     is one.
@@ -89,7 +89,7 @@ def first_set(
     """The unweighted set that a filter's frame begins with: predicted poses (N, D) plus B_0 (Eq. 9, 10).
 
     Whether limbs are apart is known only with the frame's problem: with "redraw" the poses that the particles
-    came from are kept in the set, for `settled_first`.
+    came from are kept in the set, for `constrain_first`.
     """
     drawn = noise_about(predicted, space.sigma * rules.diffusion_scale).draw(numbers)
     if rules.constraints == "clamp":
@@ -98,7 +98,7 @@ def first_set(
     return unweighted(drawn, came_from)
 
 
-def settled_first(
+def constrain_first(
     numbers: RandomNumbers,
     particles: ParticleSet,
     problem: FrameLikelihood,
@@ -113,11 +113,11 @@ def settled_first(
         return particles
     extra = {name: value for name, value in particles.extra.items() if name != CAME_FROM}
     spread = noise_about(particles.extra[CAME_FROM], space.sigma * rules.diffusion_scale)
-    first = settle(numbers.beginning, spread, particles.poses, spread.centres, problem, space, rules)
+    first = constrain_drawn(numbers.beginning, spread, particles.poses, spread.centres, problem, space, rules)
     return ParticleSet(first, particles.log_weights, particles.raw_log_weights, extra)
 
 
-def settle(
+def constrain_drawn(
     numbers: RandomNumbers,
     spread: Spread,
     drawn: Array,
@@ -126,8 +126,8 @@ def settle(
     space: SearchSpace,
     rules: SearchSettings,
 ) -> Array:
-    """(N, D) poses `drawn` from a spread, after the rules."""
-    done = settled(
+    """(N, D) poses `drawn` from a spread, with the constraints kept."""
+    done = constrain(
         problem,
         space,
         rules,

@@ -36,7 +36,7 @@ DIFFERENCE = 0.004
 MM_PER_RADIAN = 300.0
 """A length that counts like a radian: about a limb's."""
 DAMPING, EASED, TIGHTENED, MOST_DAMPING = 1e-2, 0.3, 8.0, 1e4
-SETTLED = 2e-4
+LEAST_MOVE = 2e-4
 """A step below this (radians, or mm / MM_PER_RADIAN) ends the search."""
 FEWEST_PIXELS = 3.0
 """Pixels: least width c of the robust loss, as masks are rough at this scale."""
@@ -172,8 +172,8 @@ class Refiner:
         """The loss at a pose, and gradient (D,) and matrix (D, D) of half of it per unit of each parameter."""
         return self._equations(pose, self._prepared(pose, silhouettes))
 
-    def settled_loss(self, pose: Array, silhouettes: Sequence[Distances]) -> float:
-        """The loss at a pose plus the pull towards rest, to compare poses found in different valleys."""
+    def loss_with_pull(self, pose: Array, silhouettes: Sequence[Distances]) -> float:
+        """The loss at a pose plus the pull towards rest, to compare poses of different valleys."""
         bent = (pose - self.neutral) / self.unit
         return self.loss(pose, silhouettes)[0] + float(self.stiffness @ np.square(bent))
 
@@ -218,7 +218,7 @@ class Refiner:
                 damping *= EASED
             else:
                 damping *= TIGHTENED
-            if moved < SETTLED:
+            if moved < LEAST_MOVE:
                 break
         pulls = self.settings.refinement_pull**2 + self.stiffness
         return pose, steps, matrix - np.diag(pulls)

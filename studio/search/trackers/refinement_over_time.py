@@ -10,7 +10,7 @@ p_j are the two ends of every limb and a point at its side, which shows its twis
 angles a pose is written. σ_a is a usual acceleration over three frames, σ_r the deviation of a border point's residual.
 Gauss-Newton on all poses together, damped as Levenberg and Marquardt do; its equations are banded, as a frame meets
 only two on each side. Long stretches are solved in windows, the last poses of one held still in the next. Each window
-begins with a stiffer movement, so that frames in neighbouring valleys settle in one before details count.
+begins with a stiffer movement, so that frames in neighbouring valleys come into one before details count.
 
 The papers name a local search as further work; this is one for whole movements, in the manner of B. Triggs, P.
 McLauchlan, R. Hartley and A. Fitzgibbon, "Bundle adjustment - a modern synthesis" (1999).
@@ -168,7 +168,7 @@ def windows(count: int) -> list[tuple[int, int, int]]:
 
 
 def body_points(body: BodyModel, poses: Array) -> Array:
-    """Of poses (N, D) the points by which movement is judged, (N, P) mm: a limb's ends and one at its side."""
+    """Of poses (N, D) the points by which movement is measured, (N, P) mm: a limb's ends and one at its side."""
     frames = limb_frames(body, poses)
     length = kinematic_tables(body).limb_shape[:, :1]
     middle, side = frames[..., 3] + 0.5 * length * frames[..., 2], SIDE_MM * scale_of(body)

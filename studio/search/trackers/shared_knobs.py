@@ -52,7 +52,7 @@ class SearchSettings:
         "mean", choices=("mean", "mode"),
         help="The pose that is reported: the particles' weighted mean (Eq. 8) or the best of them (Eq. 2).",
     )  # fmt: skip
-    # See `hard_priors`.
+    # See `constraints`.
     constraints: str = knob(
         "clamp", choices=CONSTRAINTS, label="impossible poses",
         help="A particle that the body cannot take: drawn again, rejected, set to its limits, or kept.",

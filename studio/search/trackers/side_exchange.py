@@ -4,7 +4,7 @@ Where two limbs cross, or a body is followed from a wrong start, a tracker may c
 outlines of few cameras that hardly shows in a single frame. It does in many: a thigh has to begin at the wrong hip,
 knees bend against their joints, feet point backwards. So a tracked clip is examined as a whole. Hypotheses: a pair of
 limbs exchanged (each where its twin is, as near as its joints allow), and the whole body facing the other way with all
-its limbs where their twins are. In a frame they are judged by the loss after refinement on the silhouettes; g =
+its limbs where their twins are. In a frame they are compared by the loss after refinement on the silhouettes; g =
 log(loss as tracked / loss exchanged), cut off at ±1, is above 0 where the exchange explains more.
 
 Over the frames the best path is found (A. Viterbi, "Error bounds for convolutional codes", 1967) that minimises
@@ -64,7 +64,7 @@ BETTER = 0.02
 NOTABLY = 0.999
 """A loss below this share of another is better."""
 MOST_ROUNDS = 10
-KEPT_SILHOUETTES, SETTLED_TOGETHER = 96, 80
+KEPT_SILHOUETTES, TAKEN_TOGETHER = 96, 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +198,7 @@ class _Work:
             return False
         kind, exchanged = best
         for first, after in runs_of(exchanged):
-            self._settle(np.arange(first, after), self._kinds[kind])
+            self._take(np.arange(first, after), self._kinds[kind])
         self._kinds[kind].odd ^= exchanged
         for known in self._kinds.values():
             known.losses[exchanged], known.poses[exchanged] = np.nan, self.poses[exchanged]
@@ -238,16 +238,16 @@ class _Work:
         heapq.heapify(waiting)
         while waiting:
             gain, row = heapq.heappop(waiting)
-            for near in (row - 1, row + 1) if -gain == self._gain(kind, row) else ():
-                if not 0 <= near < len(self.frames):
+            for beside in (row - 1, row + 1) if -gain == self._gain(kind, row) else ():
+                if not 0 <= beside < len(self.frames):
                     continue
-                known = self._gain(kind, near)
-                self._examine(kind, near)
-                if near in examined.wanted and self._gain(kind, near) < -gain - BETTER:
-                    self._offer(kind, near, examined.poses[row], row)
-                reached = self._gain(kind, near)
-                if reached != known and reached + backwards[near] >= -CLEAR:
-                    heapq.heappush(waiting, (-reached, near))
+                known = self._gain(kind, beside)
+                self._examine(kind, beside)
+                if beside in examined.wanted and self._gain(kind, beside) < -gain - BETTER:
+                    self._offer(kind, beside, examined.poses[row], row)
+                reached = self._gain(kind, beside)
+                if reached != known and reached + backwards[beside] >= -CLEAR:
+                    heapq.heappush(waiting, (-reached, beside))
 
     def _gain(self, kind: Kind, row: int) -> float:
         """g of a row, NaN where not examined, -inf where there is no such pose."""
@@ -341,11 +341,11 @@ class _Work:
 
     # ------------------------------------------------------------------ what is kept
 
-    def _settle(self, rows: Indices, examined: _Examined) -> None:
+    def _take(self, rows: Indices, examined: _Examined) -> None:
         """Take the exchanged poses of some rows, refined again from their neighbours' poses where that is better."""
         found: dict[int, tuple[Array, float]] = {}
-        for first in range(0, len(rows), SETTLED_TOGETHER):
-            part = rows[first : first + SETTLED_TOGETHER].tolist()
+        for first in range(0, len(rows), TAKEN_TOGETHER):
+            part = rows[first : first + TAKEN_TOGETHER].tolist()
             found.update({row: (examined.poses[row], self._loss(row, examined.poses[row])) for row in part})
             known = [row - 1 for row in part[:1] if row - 1 in found]
             for order in (known + part, part[::-1]):
@@ -358,7 +358,7 @@ class _Work:
 
     def _loss(self, row: int, pose: Array) -> float:
         refiner, silhouettes = self._sight(row)
-        return refiner.settled_loss(pose, silhouettes) if any(len(v.border) for v in silhouettes) else 0.0
+        return refiner.loss_with_pull(pose, silhouettes) if any(len(v.border) for v in silhouettes) else 0.0
 
 
 def best_path(gains: Array, movements: Array) -> tuple[NDArray[np.bool_], float]:

@@ -71,8 +71,8 @@ if __name__ == "__main__":
     found = {}
     for scene in SCENES:
         if scene == "in bands":
-            from studio.search.likelihood import device_kernels
+            from studio.search.likelihood import device_weighing_kernels
 
-            device_kernels.WORDS = FEW_WORDS
+            device_weighing_kernels.WORDS = FEW_WORDS
         found |= {f"{scene}.{key}": value for key, value in terms_of(scene, "gpu").items()}
     np.savez(sys.argv[1], **found)

@@ -73,8 +73,8 @@ def of_type(kind, dimensions=1):
 
 def signatures():
     """Every kernel of the modules for cards, by name, and the types that it is called with."""
-    weighing = importlib.import_module("studio.search.likelihood.device_kernels")
-    searching = importlib.import_module("studio.search.trackers.device_kernels")
+    weighing = importlib.import_module("studio.search.likelihood.device_weighing_kernels")
+    searching = importlib.import_module("studio.search.trackers.device_search_kernels")
     whole, single = numba.types.int64, numba.types.float32
     flag = numba.types.boolean
     table = numba.typeof(camera_table(four_cameras(), outward_limit, np.float32))

@@ -9,7 +9,7 @@ from simulated_search import problem_of
 from simulated_weighing import wait_politely
 
 from studio.garden.benchmarks import card_measures
-from studio.search.trackers import device_kernels, device_search, device_swarm, device_swarm_kernels
+from studio.search.trackers import device_search, device_search_kernels, device_swarm, device_swarm_kernels
 from studio.search.trackers.settings import AnnealedSettings
 from studio.search.trackers.swarm_settings import SwarmSettings
 
@@ -19,7 +19,7 @@ SMALL = SwarmSettings(
 
 if __name__ == "__main__":
     wait_politely()
-    for module in (device_kernels, device_search, device_swarm_kernels, device_swarm):
+    for module in (device_search_kernels, device_search, device_swarm_kernels, device_swarm):
         module.SUMMING = 2
     problem, space, poses = problem_of("gpu")
     filter_of_four = AnnealedSettings(layers=2, particles=4)

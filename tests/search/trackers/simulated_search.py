@@ -166,11 +166,11 @@ def together(found):
 
 
 if __name__ == "__main__":
-    from studio.search.trackers import device_kernels, device_search
+    from studio.search.trackers import device_search, device_search_kernels
 
     wait_politely()
     # The simulator runs a thread of the processor for each of the card's.
-    device_kernels.SUMMING = device_search.SUMMING = 8
+    device_search_kernels.SUMMING = device_search.SUMMING = 8
     device_search.THREADS = 8
     results = {}
     layers_of((0, 1), results, "both")

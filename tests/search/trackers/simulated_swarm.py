@@ -20,7 +20,7 @@ from studio.search.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
     EdgeRegionSilhouetteSettings,
 )
-from studio.search.trackers import device_kernels, device_runs, device_swarm, device_swarm_kernels
+from studio.search.trackers import device_runs, device_search_kernels, device_swarm, device_swarm_kernels
 from studio.search.trackers.device_runs import Moment
 from studio.search.trackers.device_swarm import DeviceSwarm, SwarmStep
 from studio.search.trackers.frame_loop import FrameSearch, SearchState, search_together
@@ -234,7 +234,7 @@ def everything() -> dict[str, Any]:
 
 if __name__ == "__main__":
     wait_politely()
-    device_kernels.SUMMING = device_swarm_kernels.SUMMING = device_swarm.SUMMING = 2
+    device_search_kernels.SUMMING = device_swarm_kernels.SUMMING = device_swarm.SUMMING = 2
     device_runs.THREADS = device_swarm.THREADS = 8
     device_runs.record_launches = lambda launches, stream: None
     Path(sys.argv[1]).write_bytes(pickle.dumps(everything()))

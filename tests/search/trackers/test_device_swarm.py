@@ -26,8 +26,9 @@ from studio.search.likelihood.edge_region_silhouette import (  # noqa: E402
     EdgeRegionSilhouetteSettings,
 )
 from studio.search.trackers import device_swarm_kernels  # noqa: E402
+from studio.search.trackers.constraints import MOST_REDRAWS  # noqa: E402
 from studio.search.trackers.counted_numbers import as_normals, as_share, random_words  # noqa: E402
-from studio.search.trackers.device_kernels import BEST, MOST  # noqa: E402
+from studio.search.trackers.device_search_kernels import BEST, MOST  # noqa: E402
 from studio.search.trackers.device_swarm_kernels import (  # noqa: E402
     OF_TRIES,
     OF_TRY,
@@ -35,7 +36,6 @@ from studio.search.trackers.device_swarm_kernels import (  # noqa: E402
     POSSIBLE,
     VALUE,
 )
-from studio.search.trackers.hard_priors import MOST_REDRAWS  # noqa: E402
 from studio.search.trackers.particle_swarm import (  # noqa: E402
     BEST_POSES,
     BEST_VALUES,
@@ -87,7 +87,7 @@ class Written:
             normal = as_normals(words[0], words[1])[d % 2]
             return float(start[d]) + sigma[d] * float(normal), float(velocities[n, d])
 
-        self.settle(layer, sampled, np.repeat(start[None], count, axis=0))
+        self.constrain(layer, sampled, np.repeat(start[None], count, axis=0))
         self.bests, self.leader = self.places.copy(), start.copy()
         self.reached = [(False, -np.inf)] * count
         self.standing = (False, -np.inf)
@@ -104,9 +104,9 @@ class Written:
             v = min(max(v, -2.0 * sigma[d]), 2.0 * sigma[d])
             return x + v, v
 
-        self.settle(layer, moved, places)
+        self.constrain(layer, moved, places)
 
-    def settle(self, layer: int, proposed: Any, came_from: np.ndarray) -> None:  # noqa: ANN401
+    def constrain(self, layer: int, proposed: Any, came_from: np.ndarray) -> None:  # noqa: ANN401
         """Places and velocities after what the scenario does beyond a limit."""
         count = len(came_from)
 

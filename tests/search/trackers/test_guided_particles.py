@@ -12,9 +12,9 @@ from studio.search.trackers.guided_particles import (
     STATES,
     VELOCITY,
     GuidedParticles,
+    draw_near,
     followed,
-    foreseen,
-    near,
+    foresee,
     propagated,
     spread_over_clusters,
     walkers_from,
@@ -143,7 +143,7 @@ def test_at_another_rate_a_symbol_is_taken_as_often_as_frames_last(fps: float, s
 def test_near_a_pose_states_are_of_the_clusters_that_it_lies_in() -> None:
     for frame in (5, 15, 25, 35):
         pose = turning_poses(9, 1, frame)
-        states, velocity = near(np.random.default_rng(frame), np.tile(pose, (500, 1)), SPACE)
+        states, velocity = draw_near(np.random.default_rng(frame), np.tile(pose, (500, 1)), SPACE)
         labels = MODEL.automaton.last_symbols[states]
         assert (labels == frame // DWELL).mean() > 0.9
         true = (turning_poses(9, 2, frame - 1)[1] - turning_poses(9, 2, frame - 1)[0])[ROOT:]
@@ -153,7 +153,7 @@ def test_near_a_pose_states_are_of_the_clusters_that_it_lies_in() -> None:
 
 def test_far_from_all_clusters_movements_stay_bounded() -> None:
     far = np.tile(turning_poses(9, 1), (50, 1)) + 100.0
-    _, velocity = near(np.random.default_rng(0), far, SPACE)
+    _, velocity = draw_near(np.random.default_rng(0), far, SPACE)
     # Eight standard deviations of the widest movement, not a hundred radians of extrapolation.
     assert np.abs(velocity).max() < 2.0
 
@@ -185,11 +185,11 @@ def test_expected_are_the_clusters_that_hold_enough_particles_at_the_mean_root()
     states = np.array([MODEL.automaton.state_after([label]) for label in [2] * 60 + [0] * 37 + [1] * 3])
     poses = np.random.default_rng(0).normal(size=(100, 9))
     particles = ParticleSet(poses, np.zeros(100), extra={STATES: states, VELOCITY: np.zeros((100, 6))})
-    places = foreseen(particles, SPACE, support=0.05, most=4)
+    places = foresee(particles, SPACE, support=0.05, most=4)
     assert np.allclose(places[:, ROOT:], MODEL.poses_only.means[[2, 0]])
     assert np.allclose(places[:, :ROOT], poses[:, :ROOT].mean(axis=0))
-    assert len(foreseen(particles, SPACE, support=0.0, most=2)) == 2
-    assert np.allclose(foreseen(particles, SPACE, support=0.9)[0, ROOT:], MODEL.poses_only.means[2])
+    assert len(foresee(particles, SPACE, support=0.0, most=2)) == 2
+    assert np.allclose(foresee(particles, SPACE, support=0.9)[0, ROOT:], MODEL.poses_only.means[2])
     plain = dataclasses.replace(particles, extra={})
-    assert np.allclose(foreseen(plain, SPACE), poses.mean(axis=0))
-    assert np.allclose(foreseen(particles, toy_space(9)), poses.mean(axis=0))
+    assert np.allclose(foresee(plain, SPACE), poses.mean(axis=0))
+    assert np.allclose(foresee(particles, toy_space(9)), poses.mean(axis=0))

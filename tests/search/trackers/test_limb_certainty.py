@@ -17,7 +17,7 @@ CAMERAS = ring_of_cameras(4, 480, 360)
 ASIDE = {"left_shoulder_rx": 0.5, "right_shoulder_rx": 0.5}
 
 
-def judged(
+def certainty_and_lost(
     body: BodyModel, pose: Array, truth: Array, memory: Mapping[str, Array] | None = None
 ) -> tuple[Certainty, dict[str, float]]:
     """The certainty of a pose on the silhouettes of another, and the probabilities."""
@@ -30,42 +30,42 @@ def judged(
 def test_a_limb_before_the_trunk_is_less_certain_than_one_held_aside(body: BodyModel) -> None:
     aside = standing(body, **ASIDE)
     before = standing(body, **{**ASIDE, "left_shoulder_rx": -0.35, "left_elbow_ry": -1.6})
-    deviations = [judged(body, pose, pose)[0] for pose in (aside, before)]
+    deviations = [certainty_and_lost(body, pose, pose)[0] for pose in (aside, before)]
     arm = deviations[0].limbs.index("left arm")
     assert deviations[1].deviation[arm] > 1.3 * deviations[0].deviation[arm]
 
 
 def test_an_arm_inside_the_trunk_in_every_view_is_lost_only_if_it_jumped_there(body: BodyModel) -> None:
     aside, inside = standing(body, **ASIDE), standing(body, left_shoulder_rx=0.5, right_shoulder_rx=-0.5)
-    found, lost = judged(body, inside, inside)
+    found, lost = certainty_and_lost(body, inside, inside)
     assert found.deviation[found.limbs.index("right arm")] > 150.0
     assert max(lost.values()) < LIMB_LOST_PROBABILITY
     memory: Mapping[str, Array] = {}
     for _ in range(3):
-        memory = judged(body, aside, aside, memory)[0].moved
-    jumped = judged(body, inside, inside, memory)[1]
+        memory = certainty_and_lost(body, aside, aside, memory)[0].moved
+    jumped = certainty_and_lost(body, inside, inside, memory)[1]
     assert [limb for limb, value in jumped.items() if value > LIMB_LOST_PROBABILITY] == ["right arm"]
 
 
 def test_no_limb_of_the_true_pose_is_lost_and_a_misplaced_one_is(body: BodyModel) -> None:
     truth = standing(body, **ASIDE)
-    assert max(judged(body, truth, truth)[1].values()) < LIMB_LOST_PROBABILITY
+    assert max(certainty_and_lost(body, truth, truth)[1].values()) < LIMB_LOST_PROBABILITY
     wrong = standing(body, **{**ASIDE, "left_shoulder_rx": 1.6})
-    assert judged(body, wrong, truth)[1]["left arm"] > 0.9
+    assert certainty_and_lost(body, wrong, truth)[1]["left arm"] > 0.9
 
 
 def test_a_limb_that_jumped_is_doubted_for_some_frames_though_the_silhouettes_agree(body: BodyModel) -> None:
     steady, jumped = standing(body, **ASIDE), standing(body, **{**ASIDE, "left_shoulder_rx": 1.6})
     memory: Mapping[str, Array] = {}
     for _ in range(3):
-        memory = judged(body, steady, steady, memory)[0].moved
-    calm = judged(body, steady, steady, memory)[1]["left arm"]
+        memory = certainty_and_lost(body, steady, steady, memory)[0].moved
+    calm = certainty_and_lost(body, steady, steady, memory)[1]["left arm"]
     after: list[dict[str, float]] = []
     for _ in range(20):
-        found, lost = judged(body, jumped, jumped, memory)
+        found, lost = certainty_and_lost(body, jumped, jumped, memory)
         memory = found.moved
         after.append(lost)
-    known = judged(body, jumped, jumped)[1]["left arm"]
+    known = certainty_and_lost(body, jumped, jumped)[1]["left arm"]
     assert after[0]["left arm"] > 5.0 * max(calm, known)
     assert after[0]["left arm"] > 5.0 * after[0]["right leg"]
     assert after[2]["left arm"] > 2.0 * known

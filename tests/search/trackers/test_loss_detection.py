@@ -121,7 +121,7 @@ def test_little_overlap_is_lost_whatever_the_weight() -> None:
 
 
 def test_a_weightings_own_verdict_counts() -> None:
-    assert calibrated().is_lost(-2.0, Sight(0.85, seen=True, judged_lost=True))
+    assert calibrated().is_lost(-2.0, Sight(0.85, seen=True, called_lost=True))
 
 
 def test_few_frames_make_no_distribution_and_old_ones_are_forgotten() -> None:

@@ -9,7 +9,7 @@ from studio.search.trackers.model_free import (
     LARGEST,
     NEWEST,
     chosen_free,
-    judged,
+    compare_kinds,
     share_in,
     share_of,
 )
@@ -38,23 +38,23 @@ def test_the_heavier_kind_moves_the_verdict() -> None:
     for better, low, high in ((50.0, 0.95, 1.0), (-50.0, 0.0, 0.05)):
         extra, weights = half_free(better)
         for _ in range(30):
-            extra = judged(extra, weights)
+            extra = compare_kinds(extra, weights)
         assert low <= extra[BEATEN][0] <= high
 
 
 def test_the_verdict_is_smoothed_over_frames() -> None:
     extra, weights = half_free(50.0)
-    first = judged(extra, weights)[BEATEN][0]
+    first = compare_kinds(extra, weights)[BEATEN][0]
     assert first == pytest.approx(NEWEST, rel=0.05)
 
 
 def test_sets_of_one_kind_and_rejected_particles_do_not_mislead() -> None:
     everyone = {FREE: np.ones(5, dtype=bool), BEATEN: np.array([0.3])}
-    assert judged(everyone, np.zeros(5)) is everyone
-    assert judged({}, np.zeros(5)) == {}
+    assert compare_kinds(everyone, np.zeros(5)) is everyone
+    assert compare_kinds({}, np.zeros(5)) == {}
     extra, weights = half_free(0.0)
     rejected = np.where(extra[FREE], -np.inf, weights)
-    assert judged(extra, rejected)[BEATEN][0] == 0.0
+    assert compare_kinds(extra, rejected)[BEATEN][0] == 0.0
 
 
 def test_the_share_grows_only_while_the_model_is_beaten() -> None:

@@ -7,8 +7,8 @@ import pytest
 from toy_problems import Bowl, toy_space
 
 from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.constraints import MOST_REDRAWS, Indices, Proposals, constrain, possible
 from studio.search.trackers.frame_loop import FrameSearch
-from studio.search.trackers.hard_priors import MOST_REDRAWS, Indices, Proposals, possible, settled
 from studio.search.trackers.particle_swarm import VELOCITIES
 from studio.search.trackers.settings import AnnealedSettings
 from studio.search.trackers.swarm_settings import SwarmSettings
@@ -61,7 +61,7 @@ def test_redraw_draws_only_what_is_impossible_and_stops_when_it_is_not() -> None
         return Proposals(column(values), np.full((len(rows), 3), float(len(draws))))
 
     first = Proposals(column([0.1, 0.8, 0.3, 0.7]), np.zeros((4, 3)))
-    done = settled(problem, SPACE, rules("redraw"), first, column([0.0] * 4), again)
+    done = constrain(problem, SPACE, rules("redraw"), first, column([0.0] * 4), again)
     assert draws == [[1, 3], [1, 3], [3], [3]]
     assert np.array_equal(done.poses[:, 0], [0.1, 0.2, 0.3, 0.2])
     assert np.array_equal(done.velocities[:, 0], [0.0, 2.0, 0.0, 4.0])
@@ -77,7 +77,7 @@ def test_after_ten_redraws_a_particle_stays_where_it_came_from() -> None:
         return Proposals(column([0.9] * len(rows)), np.full((len(rows), 3), 7.0))
 
     first = Proposals(column([0.1, 0.8]), np.full((2, 3), 3.0))
-    done = settled(problem, SPACE, rules("redraw"), first, column([0.05, 0.4]), again)
+    done = constrain(problem, SPACE, rules("redraw"), first, column([0.05, 0.4]), again)
     assert draws == [1] * MOST_REDRAWS == [1] * 10
     assert np.array_equal(done.poses[:, 0], [0.1, 0.4])
     assert np.array_equal(done.velocities, [[3.0] * 3, [0.0] * 3])
@@ -90,19 +90,19 @@ def test_where_nothing_is_possible_the_first_draw_stays() -> None:
     def again(rows: Indices, _attempt: int) -> Proposals:
         return Proposals(column([0.9] * len(rows)), np.zeros((len(rows), 3)))
 
-    done = settled(Picky(-5.0), SPACE, rules("redraw"), first, column([0.0, 0.0]), again)
+    done = constrain(Picky(-5.0), SPACE, rules("redraw"), first, column([0.0, 0.0]), again)
     assert done is first
 
 
 def test_possible_poses_are_unchanged() -> None:
     first = Proposals(column([0.1, 0.2]), np.ones((2, 3)))
-    assert settled(Picky(0.5), SPACE, rules("redraw"), first, column([0, 0]), never) is first
+    assert constrain(Picky(0.5), SPACE, rules("redraw"), first, column([0, 0]), never) is first
 
 
 def test_clamp_sets_on_the_limit_and_stops_there() -> None:
     poses = np.array([[1.5, 0.2, -3.0], [0.1, 0.2, 0.3]])
     velocities = np.array([[0.7, 0.1, -0.9], [0.4, 0.5, 0.6]])
-    done = settled(Picky(0.5), SPACE, rules("clamp"), Proposals(poses, velocities), np.zeros((2, 3)), never)
+    done = constrain(Picky(0.5), SPACE, rules("clamp"), Proposals(poses, velocities), np.zeros((2, 3)), never)
     assert np.array_equal(done.poses, [[1.0, 0.2, -1.0], [0.1, 0.2, 0.3]])
     assert np.array_equal(done.velocities, [[0.0, 0.1, 0.0], [0.4, 0.5, 0.6]])
     # A pose that clamping cannot make possible is rejected.
@@ -112,7 +112,7 @@ def test_clamp_sets_on_the_limit_and_stops_there() -> None:
 def test_reject_and_ignore_move_nothing() -> None:
     first = Proposals(column([2.0, 0.2]), np.ones((2, 3)))
     for constraints in ("reject", "ignore"):
-        assert settled(Picky(0.5), SPACE, rules(constraints), first, first.poses, never) is first
+        assert constrain(Picky(0.5), SPACE, rules(constraints), first, first.poses, never) is first
     assert np.array_equal(possible(Picky(0.5), first.poses, rules("reject")), [False, True])
     problem = Picky(0.5)
     assert possible(problem, first.poses, rules("ignore")).all()

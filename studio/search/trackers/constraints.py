@@ -1,11 +1,11 @@
-"""Hard priors: how particles in impossible poses are handled, the same for every tracker.
+"""Constraints: how particles in impossible poses are handled, the same for every tracker.
 
-A body cannot pass its joint limits and, optionally, no limb can be inside another (the two
-constraints of Fleischmann et al. 2012, 2.3; the hard priors of Balan et al. 2005). Four ways to keep them:
+A body cannot pass its joint limits and, optionally, no limb can be inside another (the two constraints of Fleischmann
+et al. 2012, 2.3; the hard priors of Balan et al. 2005, see `search.likelihood.hard_priors`). Four ways to keep them:
 
-- redraw: the random numbers of a particle's step are drawn again, from the same starting point, up to 10
-  times; after that, the particle stays where it came from (a swarm's without velocity). The
-    paper gives only the redrawn velocity and the limit of 10; the rest is our choice.
+- redraw: the random numbers of a particle's step are drawn again, from the same starting point, up to 10 times; after
+  that, the particle stays where it came from (a swarm's without velocity). The paper gives only the redrawn velocity
+  and the limit of 10; the rest is our choice.
 - reject: the particle is weighed, but has no weight.
 - clamp: a parameter beyond a limit is set on it, and its velocity to zero; a particle with limbs inside one
   another cannot be clamped and is rejected.
@@ -40,7 +40,7 @@ class Proposals:
         return cls(poses, np.zeros((len(poses), 0)))
 
 
-def settled(
+def constrain(
     problem: FrameLikelihood,
     space: SearchSpace,
     rules: SearchSettings,
@@ -48,26 +48,26 @@ def settled(
     came_from: Array,
     again: Callable[[Indices, int], Proposals],
 ) -> Proposals:
-    """The proposals after the rules were applied; those to be rejected are still among them (see `possible`).
+    """The proposals with the constraints kept; those to be rejected are still among them (see `possible`).
 
     came_from : (N, D) where each particle started. again : new proposals for some rows, from the same starting
     points with the random numbers of an attempt, from 1.
     """
     if rules.constraints == "clamp":
-        return clamped(space, proposed)
+        return clamp(space, proposed)
     if rules.constraints == "redraw":
         return _redrawn(problem, rules.limbs_apart, proposed, came_from, again)
     return proposed
 
 
 def possible(problem: FrameLikelihood, poses: Array, rules: SearchSettings) -> Mask:
-    """(N,) whether a particle counts."""
+    """(N,) whether the body can take a pose; all count as such where nothing is checked."""
     if rules.constraints == "ignore":
         return np.ones(len(poses), dtype=bool)
     return problem.feasible(poses, limbs_apart=rules.limbs_apart)
 
 
-def clamped(space: SearchSpace, proposed: Proposals) -> Proposals:
+def clamp(space: SearchSpace, proposed: Proposals) -> Proposals:
     """Proposals with every parameter set within its limits; a velocity that led beyond one becomes zero."""
     poses = np.clip(proposed.poses, space.lower, space.upper)
     if not proposed.velocities.size:
