@@ -80,7 +80,8 @@ def take(page: Page, window: StudioPage, picture: Picture) -> None:
     scene = page.frame_locator("iframe")
     scene.locator("canvas").first.wait_for()
     if is_studio:
-        scene.get_by_role("tab").first.wait_for(state="attached")
+        # A narrow scene has its panel, but hides it.
+        scene.get_by_role("tab", include_hidden=True).first.wait_for(state="attached")
     warning = scene.locator("#webgl-software-rendering button")
     for _ in range(60):
         page.wait_for_timeout(500)

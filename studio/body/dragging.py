@@ -15,7 +15,7 @@ from studio.body.branches import within_limits
 from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.inverse_kinematics import MM_PER_RADIAN
 from studio.body.least_squares import fitted_parameters, strictly_inside
-from studio.body.model import BodyModel, extremities
+from studio.body.model import BodyModel, extremities, joints_upwards
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.errors import BodyError
 from studio.foundations.geometry.reach import within_reach
@@ -60,7 +60,7 @@ class Dragger:
         self._scale = np.where(body.angles, 1.0, MM_PER_RADIAN)
         self._ends = extremities(body)
         self._joint = root_joint(body)
-        root = _moved_by(body, self._joint)
+        root = body.joints[self._joint].parameters if self._joint >= 0 else ()
         self._root = np.isin(np.arange(len(body.parameters)), root)
         self._chains = [self._chain(limb.joint) for limb in body.drawn]
         self.grips = tuple(
@@ -198,26 +198,15 @@ class Dragger:
 
     def _chain(self, joint: int) -> Indices:
         """The parameters that move a joint's frame, root's left out, from the root outwards."""
-        parameters: list[int] = []
-        while joint >= 0:
-            parameters = [
-                place for place in _moved_by(self.body, joint) if not self._root[place]
-            ] + parameters
-            joint = self.body.joints[joint].parent
-        return np.array(parameters, dtype=np.int64)
-
-
-def _moved_by(body: BodyModel, joint: int) -> list[int]:
-    """The parameters of a joint's steps, root joints of several frames counting as one."""
-    if joint < 0:
-        return []
-    return [step.parameter for step in body.joints[joint].steps if step.parameter >= 0]
+        outwards = reversed(list(joints_upwards(self.body, joint)))
+        moving = [place for at in outwards for place in self.body.joints[at].parameters]
+        return np.array([place for place in moving if not self._root[place]], dtype=np.int64)
 
 
 def root_joint(body: BodyModel) -> int:
     """The joint that carries the body through the world; -1 where it is fixed to it."""
     for at, joint in enumerate(body.joints):
-        used = [body.parameters[step.parameter] for step in joint.steps if step.parameter >= 0]
+        used = [body.parameters[place] for place in joint.parameters]
         if used:
             free = any(entry.kind == "length" and not math.isfinite(entry.lower) for entry in used)
             return at if free else -1

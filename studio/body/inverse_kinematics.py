@@ -160,8 +160,7 @@ class _MarkerProblem:
 def _root(body: BodyModel) -> tuple[Indices, Indices, Indices]:
     """The parameters of the first joint that moves: all, its angles, its lengths."""
     for joint in body.joints:
-        used = [step.parameter for step in joint.steps if step.parameter >= 0]
-        if used:
+        if used := joint.parameters:
             turns = [place for place in used if body.parameters[place].kind == "angle"]
             moves = [place for place in used if body.parameters[place].kind == "length"]
             return np.array(used), np.array(turns, dtype=np.int64), np.array(moves, dtype=np.int64)

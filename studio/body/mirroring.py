@@ -207,5 +207,4 @@ def _parameter_twins(body: BodyModel) -> Indices:
 
 
 def _parameters_of(body: BodyModel, joint: int) -> Indices:
-    steps = body.joints[joint].steps if joint >= 0 else ()
-    return np.array([step.parameter for step in steps if step.parameter >= 0], dtype=np.int64)
+    return np.array(body.joints[joint].parameters if joint >= 0 else (), dtype=np.int64)

@@ -6,8 +6,9 @@ fixed number or by one parameter of the pose vector), so any order and direction
 down. Lengths in mm, angles in radians here (degrees in body files).
 """
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -59,6 +60,11 @@ class Joint:
     name: str
     parent: int
     steps: tuple[Step, ...]
+
+    @property
+    def parameters(self) -> tuple[int, ...]:
+        """The entries of the pose vector that its steps read, in their order."""
+        return tuple(step.parameter for step in self.steps if step.parameter >= 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,27 +191,36 @@ def kinematic_tables(body: BodyModel) -> KinematicTables:
     )
 
 
+def joints_upwards(body: BodyModel, joint: int) -> Iterator[int]:
+    """A joint and those that it hangs from, up to the root; none of -1, the world."""
+    while joint >= 0:
+        yield joint
+        joint = body.joints[joint].parent
+
+
+def joints_above(body: BodyModel, joint: int) -> Iterator[int]:
+    """The joints that a joint hangs from, the nearest first."""
+    return itertools.islice(joints_upwards(body, joint), 1, None)
+
+
 def moving_joint(body: BodyModel, joint: int) -> int:
     """The joint itself or, as far as joints are fixed, the one above; -1: it is fixed to the world."""
-    while joint >= 0 and all(step.parameter < 0 for step in body.joints[joint].steps):
-        joint = body.joints[joint].parent
-    return joint
+    return next((at for at in joints_upwards(body, joint) if body.joints[at].parameters), -1)
+
+
+def limb_moving(body: BodyModel, joint: int) -> str | None:
+    """The limb of the first parameter that moves a joint, or the nearest joint above that moves; None: it is fixed."""
+    moving = moving_joint(body, joint)
+    return body.parameters[body.joints[moving].parameters[0]].limb if moving >= 0 else None
 
 
 def ends_of(body: BodyModel, limbs: Sequence[Limb]) -> Mask:
     """(L,) which of some limbs are ends of the body: none of the others hangs from them. Flesh may lie on a fixed joint
     beside its bone's, so that a limb also hangs from what its bone's joint hangs from.
     """
-
-    def above(joint: int) -> set[int]:
-        joints = set[int]()
-        while joint >= 0 and (joint := body.joints[joint].parent) >= 0:
-            joints.add(joint)
-        return joints
-
     bones = [moving_joint(body, limb.joint) for limb in limbs]
-    carrying = set[int]().union(*(above(limb.joint) for limb in limbs))
-    bearing = set[int]().union(*(above(bone) for bone in bones))
+    carrying = {above for limb in limbs for above in joints_above(body, limb.joint)}
+    bearing = {above for bone in bones for above in joints_above(body, bone)}
     return np.array(
         [limb.joint not in carrying and bone not in bearing for limb, bone in zip(limbs, bones, strict=True)],
         dtype=np.bool_,

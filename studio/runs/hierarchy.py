@@ -9,7 +9,7 @@ only.
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.model import BodyModel, moving_joint
+from studio.body.model import BodyModel, joints_above, joints_upwards, moving_joint
 from studio.foundations.arrays import Indices
 from studio.search.trackers.tracker import Hierarchy
 
@@ -51,12 +51,9 @@ def _cut(body: BodyModel, joints: set[int]) -> int:
     """The joint at which the farther part of a limb begins; one past the last where the limb is not cut."""
     lengths: dict[int, float] = {}
     for limb in body.drawn:
-        at = limb.joint
         # A cone may sit on a fixed joint below the one that moves it.
-        while at >= 0 and at not in joints:
-            at = body.joints[at].parent
-        moves = at >= 0 and body.joints[at].parent >= 0
-        if moves:
+        at = next((joint for joint in joints_upwards(body, limb.joint) if joint in joints), -1)
+        if at >= 0 and body.joints[at].parent >= 0:
             lengths[at] = max(lengths.get(at, 0.0), abs(limb.length))
     longest = sorted(lengths, key=lambda number: (-lengths[number], number))[:2]
     return max(longest) if len(longest) == 2 else len(body.joints)
@@ -80,14 +77,7 @@ def _carries(body: BodyModel, limb: str, joint: Indices) -> bool:
     """Whether the joints of another limb hang on this one's."""
     own = {int(joint[row]) for row, entry in enumerate(body.parameters) if entry.limb == limb}
     others = {int(number) for number in joint} - own
-    return any(own & _ancestors(body, number) for number in others)
-
-
-def _ancestors(body: BodyModel, number: int) -> set[int]:
-    ancestors: set[int] = set()
-    while (number := body.joints[number].parent) >= 0:
-        ancestors.add(number)
-    return ancestors
+    return any(above in own for number in others for above in joints_above(body, number))
 
 
 def _pairs(body: BodyModel, depth: Indices) -> Indices:

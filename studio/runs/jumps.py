@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, limb_moving
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array, median_and_spread, runs_of
 from studio.runs.tracks import Track, stretches
@@ -66,11 +66,7 @@ def jumps_of(body: BodyModel, track: Track) -> tuple[Jump, ...]:
 
 def marker_limbs(body: BodyModel) -> tuple[str, ...]:
     """(M,) each marker's limb: the group of the parameters that move its joint, or the nearest joint above."""
-    owned: dict[int, str] = {}
-    for index, joint in enumerate(body.joints):
-        moved = [step.parameter for step in joint.steps if step.parameter >= 0]
-        owned[index] = body.parameters[moved[0]].limb if moved else owned.get(joint.parent, "")
-    return tuple(owned[marker.joint] for marker in body.markers)
+    return tuple(limb_moving(body, marker.joint) or "" for marker in body.markers)
 
 
 def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array, least: float) -> list[Jump]:

@@ -84,7 +84,7 @@ def root_parameters(body: BodyModel) -> IntArray:
     ]
     if len(roots) != 1 or not free:
         return np.zeros(0, dtype=np.int64)
-    return np.array([step.parameter for step in free[0].steps if step.parameter >= 0], dtype=np.int64)
+    return np.array(free[0].parameters, dtype=np.int64)
 
 
 def root_candidates(body: BodyModel, hull: Hull, pose: Array, *, upright: bool = True) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, limb_moving
 from studio.body.motion_files.trc import MarkerMotion
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array, Indices
@@ -335,12 +335,8 @@ def limb_of_drawn(body: BodyModel) -> dict[str, str]:
 
 def _limb_of_joints(body: BodyModel) -> dict[int, str]:
     """The limb of the parameters that move each joint, or the one above it."""
-    owned: dict[int, str] = {}
     still = TRUNK if has_sides(body) else body.parameters[0].limb
-    for index, joint in enumerate(body.joints):
-        moved = [step.parameter for step in joint.steps if step.parameter >= 0]
-        owned[index] = body.parameters[moved[0]].limb if moved else owned.get(joint.parent, still)
-    return owned
+    return {joint: limb_moving(body, joint) or still for joint in range(len(body.joints))}
 
 
 def _common_markers(

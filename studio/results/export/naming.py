@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from studio.body.forward_kinematics import joint_frames
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, joints_above
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.errors import ExportError
 from studio.foundations.foreign_files import read_file
@@ -68,10 +68,7 @@ class Points:
         before: list[int] = []
         for joint, points in sorted(carried.items()):
             lines += itertools.pairwise(points)
-            above = body.joints[joint].parent
-            while above >= 0 and above not in carried:
-                above = body.joints[above].parent
-            if ends := carried.get(above, before):
+            if ends := next((carried[at] for at in joints_above(body, joint) if at in carried), before):
                 far = [float(np.linalg.norm(places[point] - origins[joint])) for point in ends]
                 lines.append((ends[int(np.argmin(far))], points[0]))
             before = before + points

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from studio.body.forward_kinematics import joint_frames, marker_points
-from studio.body.model import BodyModel, Marker, extremities
+from studio.body.model import BodyModel, Marker, extremities, joints_above, joints_upwards
 
 _MUCH_NEARER = 0.5
 
@@ -32,7 +32,7 @@ def marker_links(body: BodyModel, names: Sequence[str]) -> list[tuple[int, int]]
     for joint, markers in carried.items():
         first = markers[0].name
         pairs += [(first, other.name) for other in markers[1:]]
-        above = _carrying_joint_above(body, joint, carried)
+        above = next((at for at in joints_above(body, joint) if at in carried), None)
         if above is None:
             continue
         far = {name: float(np.linalg.norm(point - origins[joint])) for name, point in rest.items()}
@@ -44,33 +44,18 @@ def marker_links(body: BodyModel, names: Sequence[str]) -> list[tuple[int, int]]
     return [(place[one], place[other]) for one, other in pairs]
 
 
-def _carrying_joint_above(body: BodyModel, joint: int, carried: dict[int, list[Marker]]) -> int | None:
-    above = body.joints[joint].parent
-    while above >= 0 and above not in carried:
-        above = body.joints[above].parent
-    return above if above >= 0 else None
-
-
 def marker_sides(body: BodyModel) -> dict[str, str]:
     """Marker name to "left", "right" or "middle": the side of the nearest limb on its joint or above."""
     sides = {limb.joint: limb.side for limb in body.limbs}
-    sides_of_markers: dict[str, str] = {}
-    for marker in body.markers:
-        joint = marker.joint
-        while joint >= 0 and joint not in sides:
-            joint = body.joints[joint].parent
-        sides_of_markers[marker.name] = sides.get(joint, "middle")
-    return sides_of_markers
+    return {
+        marker.name: next((sides[at] for at in joints_upwards(body, marker.joint) if at in sides), "middle")
+        for marker in body.markers
+    }
 
 
 def extremity_markers(body: BodyModel) -> tuple[str, ...]:
     """The outermost marker towards each extremity: wrists, ankles, head, tips (hands and feet may carry none)."""
     last = {marker.joint: marker.name for marker in body.markers}
-    names: dict[str, None] = {}
-    for index in extremities(body):
-        joint = body.drawn[index].joint
-        while joint >= 0 and joint not in last:
-            joint = body.joints[joint].parent
-        if joint >= 0:
-            names[last[joint]] = None
-    return tuple(names)
+    ends = (body.drawn[index].joint for index in extremities(body))
+    nearest = (next((last[at] for at in joints_upwards(body, end) if at in last), None) for end in ends)
+    return tuple(dict.fromkeys(name for name in nearest if name is not None))

@@ -68,8 +68,7 @@ def pointers_of(body: BodyModel, *, movable: bool) -> tuple[Pointer, ...]:
     frames = joint_frames(body, body.neutral)[0]
     shapes, pointers = kinematic_tables(body).limb_shape, list[Pointer]()
     for limb, shape in zip(body.drawn, shapes, strict=True):
-        own = any(step.parameter >= 0 for step in body.joints[limb.joint].steps)
-        if limb.name not in POINTING or (movable and not own):
+        if limb.name not in POINTING or (movable and not body.joints[limb.joint].parameters):
             continue
         if limb.name == HEAD:
             axis = frames[limb.joint, :, :3].T @ _rest_forward(body)

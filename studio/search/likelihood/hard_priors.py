@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import checked_poses, limb_frames
-from studio.body.model import BodyModel, kinematic_tables, moving_joint
+from studio.body.model import BodyModel, joints_above, kinematic_tables, moving_joint
 from studio.foundations.arrays import Array, Floats
 from studio.foundations.errors import BodyError
 from studio.foundations.numba_in_threads import parallel_blocks
@@ -122,13 +122,10 @@ def _parents(body: BodyModel) -> list[int]:
     for index, limb in enumerate(body.drawn):
         # Flesh lies on a fixed joint beside its bone's.
         owner.setdefault(moving_joint(body, limb.joint), index)
-    found: list[int] = []
-    for index, limb in enumerate(body.drawn):
-        joint = body.joints[limb.joint].parent
-        while joint >= 0 and owner.get(joint, index) == index:
-            joint = body.joints[joint].parent
-        found.append(owner.get(joint, -1))
-    return found
+    return [
+        next((owner[at] for at in joints_above(body, limb.joint) if owner.get(at, index) != index), -1)
+        for index, limb in enumerate(body.drawn)
+    ]
 
 
 def _begins_inside(body: BodyModel) -> list[bool]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, moving_joint
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.search.likelihood.outlines import OutlineProjector
@@ -101,11 +101,7 @@ class Agreement:
 
 def limb_names(body: BodyModel) -> tuple[str, ...]:
     """(L,) limb that each drawn one belongs to: that of the nearest parameter towards the root."""
-    found: list[str] = []
-    for limb in body.drawn:
-        joint, moved = limb.joint, list[int]()
-        while joint >= 0 and not moved:
-            moved = [step.parameter for step in body.joints[joint].steps if step.parameter >= 0]
-            joint = body.joints[joint].parent
-        found.append(body.parameters[moved[-1]].limb if moved else "")
-    return tuple(found)
+    moving = [moving_joint(body, limb.joint) for limb in body.drawn]
+    return tuple(
+        body.parameters[body.joints[joint].parameters[-1]].limb if joint >= 0 else "" for joint in moving
+    )

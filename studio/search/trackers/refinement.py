@@ -317,7 +317,7 @@ def rigid_limbs(body: BodyModel) -> NDArray[np.bool_]:
     the elbow is bent.
     """
     ends = free_ends(body)
-    still = [all(step.parameter < 0 for step in body.joints[limb.joint].steps) for limb in body.drawn]
+    still = [not body.joints[limb.joint].parameters for limb in body.drawn]
     joints = [limb.joint for limb in body.drawn]
     follows = np.array([moving_joint(body, joint) in joints for joint in joints], dtype=np.bool_)
     return ends & follows & np.array(still, dtype=np.bool_)
