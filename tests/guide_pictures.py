@@ -55,10 +55,11 @@ PICTURES = (
     Picture("first-seen.jpg", f"{WALK}ten-layers&frame=10&layer=1&panel=views&view=variance"),
     Picture("first-survival.jpg", f"{WALK}ten-layers&frame=10&layer=4&panel=views&view=schedule&step=2"),
     Picture("first-failing.jpg", f"{WALK}one-layer&frame=13&panel=compare&compared=walk/ten-layers&step=3"),
-    Picture("course-docked.jpg", "course=arm"),
     Picture(
         "studio.jpg", f"{WALK}ten-layers&frame=10&layer=1&panel=views&view=variance&step=4", "", (1440, 960)
     ),
+    # The last: a window that the course was docked in shows it from then on.
+    Picture("course-docked.jpg", "course=arm"),
 )
 
 
