@@ -10,7 +10,7 @@ frames processed before.
 
 import threading
 from collections.abc import Sequence
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import cv2
 import numpy as np
@@ -31,16 +31,27 @@ BACKGROUND_SHARE = 0.7
 """Weight of the mixture's Gaussians that are background; rarer ones are foreground."""
 LEAST_VARIANCE = 16.0
 """Least variance of the mixture's Gaussians: from a few still training frames a pixel's noise is underestimated."""
+SHADOW_MARK = 127
+"""Of OpenCV's models."""
 FROZEN = {"mog2": 0.0, "knn": 1e-8}
 """Learning rates that change nothing (0 means "now" to OpenCV's KNN). Both models then see the training
 frames twice more, so that updates already due and the order of a mixture's Gaussians are settled."""
 
 
+class Foreground(NamedTuple):
+    """A picture's pixels before any clean-up, each (H, W) uint8, 0 or 255. mask : those that differ from the background
+    and are no shadow. shadow : those that differ and pass for a shadow.
+    """
+
+    mask: Bytes
+    shadow: Bytes
+
+
 class BackgroundModel(Protocol):
     """One camera's background, fitted."""
 
-    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
-        """(H, W) uint8, 255 where the picture differs from the background, before any clean-up."""
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Foreground:
+        """What of a picture (H, W, 3) differs from the background."""
         ...
 
 
@@ -67,15 +78,15 @@ class GaussianBackground:
         self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
         self.is_grey = float(np.ptp(self._samples, axis=2).mean()) < GREY_SPREAD
 
-    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
-        """(H, W) uint8, 255 where the picture differs and is no shadow."""
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Foreground:
+        """What of a picture (H, W, 3) differs from the background."""
         gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)
         picture, noise = np.ascontiguousarray(picture), np.float32(settings.mask_noise**2)
         threshold = np.float32(settings.mask_threshold**2)
         changed = differing_pixels(picture, self.mean, self._rough, self.variance, gain, threshold, noise)
         if not self.tests_shadows(settings):
-            return changed
-        return drop_shadows(
+            return Foreground(changed, np.zeros_like(changed))
+        mask = drop_shadows(
             changed,
             picture,
             self.mean,
@@ -85,6 +96,7 @@ class GaussianBackground:
             np.float32(settings.mask_shadow_colour),
             settings.mask_shadow_window // 2,
         )
+        return Foreground(mask, changed - mask)
 
     def tests_shadows(self, settings: EvidenceSettings) -> bool:
         """Whether darker pixels may count as background: a grey picture has no colour to compare."""
@@ -129,8 +141,8 @@ class SubtractorBackground:
             self._model.apply(picture, learningRate=self._rate)
         self._lock = threading.Lock()
 
-    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
-        """(H, W) uint8, 255 for foreground; OpenCV's shadow pixels are background, by its own test alone."""
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Foreground:
+        """What of a picture (H, W, 3) differs from the background; shadows by OpenCV's own test alone."""
         with self._lock:
             if isinstance(self._model, cv2.BackgroundSubtractorMOG2):
                 self._model.setVarThreshold(settings.mask_threshold**2)
@@ -139,7 +151,8 @@ class SubtractorBackground:
             self._model.setDetectShadows(settings.mask_shadow_test)
             self._model.setShadowThreshold(settings.mask_shadow_darkest)
             marked = self._model.apply(picture, learningRate=self._rate)
-        return np.asarray(cv2.threshold(marked, 200, 255, cv2.THRESH_BINARY)[1], dtype=np.uint8)
+        mask = np.asarray(cv2.threshold(marked, 200, 255, cv2.THRESH_BINARY)[1], dtype=np.uint8)
+        return Foreground(mask, np.where(marked == SHADOW_MARK, np.uint8(255), np.uint8(0)))
 
 
 def gaussian_from_frames(frames: Sequence[Bytes]) -> GaussianBackground:

@@ -1,20 +1,23 @@
 """One frame's evidence: pictures, masks and edge maps of all cameras.
 
 A maker is cheap to build (a changed knob builds another one); the fitted background models are
-expensive, so they are shared in `Backgrounds`. Cameras are independent: with an executor of two threads a frame
-takes half the time.
+expensive, so they are shared in `Backgrounds`. Cameras are independent but for what looks like a shadow
+(`floor_shadows`): with an executor of two threads a frame takes half the time.
 """
 
 import functools
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import cv2
 import numpy as np
+from cachetools import LRUCache
 
 from studio.evidence.backgrounds import Backgrounds, FittedKind
 from studio.evidence.edges import bodytrack_edges, proximity_edges
+from studio.evidence.floor_shadows import Cells, cells_of, floor_shadows, with_cells
 from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence, ViewEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
@@ -27,14 +30,23 @@ from studio.foundations.tracing import span
 
 KINDS: dict[str, FittedKind] = {"median": "median", "combined": "combined", "mog2": "mog2", "knn": "knn"}
 """Models by the knob's value; all others are Gaussians."""
+KEPT_CELLS = 512
+"""Pictures whose cells are kept: what asks for one camera after the other needs those of all."""
+_T = TypeVar("_T")
+_U = TypeVar("_U")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawMask:
-    """A camera's mask (H, W), 0 or 255, before its clean-up. to_clean : whether it is to be cleaned."""
+    """A camera's mask (H, W), 0 or 255, before its clean-up.
+
+    to_clean : whether it is to be cleaned. shadow : (H, W), 255 where a pixel changed but passes for a shadow; None:
+    nowhere.
+    """
 
     mask: Bytes
     to_clean: bool
+    shadow: Bytes | None = None
 
 
 class EvidenceMaker:
@@ -57,6 +69,8 @@ class EvidenceMaker:
         self.settings, self.edge_kind = settings, edge_kind
         self.footage, self._backgrounds, self._executor = footage, backgrounds, executor
         self.hull_of_pixels = edge_kind == "hull" and self._from_pixels()
+        self._filmed_by = {camera.name: camera for camera in cameras}
+        self._cells = LRUCache[tuple[str, int], Cells](KEPT_CELLS)
 
     def release(self, camera: str) -> None:
         """Give a camera's video and background models back; they are opened again when needed."""
@@ -65,23 +79,92 @@ class EvidenceMaker:
 
     def evidence(self, frame: int) -> FrameEvidence:
         """The evidence of a frame, views in the order of the cameras. Raises FootageError, NotFoundError."""
-        if self._executor is None:
-            views = [self.view(camera, frame) for camera in self.cameras]
-        else:
-            views = list(self._executor.map(partial(self.view, frame=frame), self.cameras))
-        return FrameEvidence(frame, tuple(views))
+        if self.hull_of_pixels:
+            return FrameEvidence(
+                frame, tuple(self._each(lambda camera: self.view(camera, frame), self.cameras))
+            )
+
+        def raw_mask(camera: str) -> RawMask:
+            with span("decode", frame):
+                picture = self.footage.picture(camera, frame)
+            with span("mask", frame):
+                return self.raw_mask(camera, frame, picture)
+
+        raw = dict(zip(self.cameras, self._each(raw_mask, self.cameras), strict=True))
+        with span("floor shadows", frame):
+            raw = self.without_false_shadows(raw)
+
+        def finished(camera: str) -> ViewEvidence:
+            with span("mask", frame):
+                mask = self.finished_mask(camera, raw[camera])
+            return self.of_mask(camera, frame, mask, self._hidden(camera, frame))
+
+        return FrameEvidence(frame, tuple(self._each(finished, self.cameras)))
 
     def view(self, camera: str, frame: int) -> ViewEvidence:
-        with span("decode", frame):
-            picture = self.footage.picture(camera, frame)
+        """One camera's evidence of a frame, as in that of all."""
         if self.hull_of_pixels:
+            with span("decode", frame):
+                picture = self.footage.picture(camera, frame)
             nothing = _nothing(picture.shape[0], picture.shape[1])
             background = self._backgrounds.yuv(camera, self.settings.hull_noise)
             return ViewEvidence(camera, picture, nothing, nothing, background)
-        with span("mask", frame):
-            mask = self.finished_mask(camera, self.raw_mask(camera, frame, picture))
+        return self.of_mask(camera, frame, self.mask(camera, frame), self._hidden(camera, frame))
+
+    def mask(self, camera: str, frame: int) -> Bytes:
+        """(H, W) 0 or 255: one camera's mask of a frame, as in the evidence of all."""
+        raw = self.raw_mask(camera, frame, self.footage.picture(camera, frame))
+        if raw.shadow is not None and self._tests_floor():
+            self.note(camera, frame, raw)
+            present = [name for name in self.cameras if name not in self.footage.absent(frame)]
+            for other in present:
+                if (other, frame) not in self._cells:
+                    self.note(other, frame)
+            seen = {name: self._cells[name, frame] for name in present}
+            raw = self._without({camera: raw}, seen)[camera]
+        return self.finished_mask(camera, raw)
+
+    def note(self, camera: str, frame: int, raw: RawMask | None = None) -> None:
+        """Keep what the other cameras' masks of the frame need of a camera, so that these can be made without it."""
+        if self._tests_floor():
+            raw = raw or self.raw_mask(camera, frame, self.footage.picture(camera, frame))
+            self._cells[camera, frame] = cells_of(raw.mask, raw.shadow)
+
+    def without_false_shadows(self, raw: Mapping[str, RawMask]) -> dict[str, RawMask]:
+        """A frame's masks by camera, with what looked like shadows but cannot be any on the floor."""
+        if not self._tests_floor() or all(one.shadow is None for one in raw.values()):
+            return dict(raw)
+        return self._without(raw, {name: cells_of(one.mask, one.shadow) for name, one in raw.items()})
+
+    def _tests_floor(self) -> bool:
+        return self.settings.mask_shadow_test and self.settings.mask_shadow_floor
+
+    def _without(self, raw: Mapping[str, RawMask], seen: Mapping[str, Cells]) -> dict[str, RawMask]:
+        """The same of some masks. seen : cells of all cameras."""
+        cameras = tuple(self._filmed_by[name] for name in seen)
+        tells = floor_shadows(cameras)
+        # Where pictures and calibration differ in size, no place is known.
+        if not tells.usable or any(
+            one.mask.shape != (self._filmed_by[name].height, self._filmed_by[name].width)
+            for name, one in raw.items()
+        ):
+            return dict(raw)
+        chosen = dict(zip(seen, tells.unexplained(tuple(seen.values())), strict=True))
+        return {
+            name: one
+            if one.shadow is None
+            else replace(one, mask=with_cells(one.mask, one.shadow, chosen[name], seen[name].size))
+            for name, one in raw.items()
+        }
+
+    def _hidden(self, camera: str, frame: int) -> Bytes | None:
         given = self.settings.background_model in ("auto", "mask")
-        return self.of_mask(camera, frame, mask, self.footage.hidden(camera, frame) if given else None)
+        return self.footage.hidden(camera, frame) if given else None
+
+    def _each(self, make: Callable[[_T], _U], items: Iterable[_T]) -> list[_U]:
+        return (
+            [make(one) for one in items] if self._executor is None else list(self._executor.map(make, items))
+        )
 
     def of_mask(self, camera: str, frame: int, mask: Bytes, hidden: Bytes | None) -> ViewEvidence:
         """One camera's evidence with a given mask (H, W), 0 or 255. hidden : as in `ViewEvidence`."""
@@ -116,7 +199,8 @@ class EvidenceMaker:
             return RawMask(between_thresholds(picture, self.settings), True)
         kind: FittedKind = KINDS.get(choice, "gaussian")
         model = self._backgrounds.model(camera, kind)
-        return RawMask(model.foreground(picture, self.settings), True)
+        found = model.foreground(picture, self.settings)
+        return RawMask(found.mask, True, found.shadow if self.settings.mask_shadow_test else None)
 
     def finished_mask(self, camera: str, raw: RawMask) -> Bytes:
         """(H, W) 0 or 255: a raw mask, cleaned if `to_clean`, without excluded areas."""

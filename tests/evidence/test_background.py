@@ -50,12 +50,12 @@ def test_mean_and_deviation_of_an_empty_clip() -> None:
 
 def test_person_is_found_and_the_shadow_is_not() -> None:
     frame, mask = scene(1)
-    found = model().foreground(frame, SETTINGS) > 0
+    found = model().foreground(frame, SETTINGS).mask > 0
     assert found[mask].mean() > 0.99
     assert found[SHADOW].mean() < 0.03
     assert found[~mask].mean() < 0.002
     without = dataclasses.replace(SETTINGS, mask_shadow_test=False)
-    assert (model().foreground(frame, without) > 0)[SHADOW].mean() > 0.95
+    assert (model().foreground(frame, without).mask > 0)[SHADOW].mean() > 0.95
 
 
 def test_skin_on_a_floor_of_nearly_its_colour_is_no_shadow() -> None:
@@ -66,12 +66,12 @@ def test_skin_on_a_floor_of_nearly_its_colour_is_no_shadow() -> None:
     light[skin] = 0.7 * floor[skin] + (-6.0, 0.0, 5.0)
     light[shadow] = 0.7 * floor[shadow]
     background = gaussian_from_frames([seen(floor, seed) for seed in range(100, 130)])
-    found = background.foreground(seen(light, 5), SETTINGS) > 0
+    found = background.foreground(seen(light, 5), SETTINGS).mask > 0
     assert found[skin].mean() > 0.85
     assert found[shadow].mean() < 0.03
     for tolerance in (0.01, 0.02, 0.03, 0.04):
         alone = dataclasses.replace(SETTINGS, mask_shadow_window=1, mask_shadow_colour=tolerance)
-        found = background.foreground(seen(light, 5), alone) > 0
+        found = background.foreground(seen(light, 5), alone).mask > 0
         assert found[skin].mean() < 0.7 or found[shadow].mean() > 0.1
 
 
@@ -80,7 +80,7 @@ def test_shadows_are_those_of_a_plain_sum_over_the_changed_pixels_around(window:
     frame, _ = scene(4, (0.9, 1.0, 1.1))
     settings = dataclasses.replace(SETTINGS, mask_shadow_window=window)
     background = model()
-    changed = background.foreground(frame, dataclasses.replace(settings, mask_shadow_test=False)) > 0
+    changed = background.foreground(frame, dataclasses.replace(settings, mask_shadow_test=False)).mask > 0
     expected = background.mean.astype(np.float64) * background.gain(frame)
     seen_colours, reach = frame.astype(np.float64), window // 2
 
@@ -109,7 +109,7 @@ def test_shadows_are_those_of_a_plain_sum_over_the_changed_pixels_around(window:
         loose = float(MIXED) ** 2 * limit(expected) + settings.mask_noise**2
         alone = (off_colour(seen_colours, expected) ** 2).sum(-1) < loose
         found &= ~(~inside & alone & (share >= settings.mask_shadow_darkest) & (share < 1.0))
-    differing = (background.foreground(frame, settings) > 0) != found
+    differing = (background.foreground(frame, settings).mask > 0) != found
     # The background is summed in sixteenths of a grey level.
     assert changed.sum() > 1000
     assert differing.sum() <= 0.002 * changed.sum()
@@ -118,7 +118,7 @@ def test_shadows_are_those_of_a_plain_sum_over_the_changed_pixels_around(window:
 def test_shadows_darker_than_allowed_are_foreground() -> None:
     frame, _ = scene(1)
     strict = dataclasses.replace(SETTINGS, mask_shadow_darkest=0.8)
-    assert (model().foreground(frame, strict) > 0)[SHADOW].mean() > 0.9
+    assert (model().foreground(frame, strict).mask > 0)[SHADOW].mean() > 0.9
 
 
 def test_the_threshold_counts_deviations() -> None:
@@ -128,17 +128,17 @@ def test_the_threshold_counts_deviations() -> None:
     for threshold in (2.0, 3.0):
         chosen = dataclasses.replace(plain, mask_threshold=threshold)
         outside = np.abs(frame - ROOM.astype(np.float32)).max(axis=2) > np.float32(threshold * NOISE)
-        np.testing.assert_array_equal(background.foreground(frame, chosen) > 0, outside)
+        np.testing.assert_array_equal(background.foreground(frame, chosen).mask > 0, outside)
 
 
 def test_another_exposure_is_fitted() -> None:
     gain = (0.85, 1.1, 1.05)
     frame, mask = scene(2, gain)
     np.testing.assert_allclose(model().gain(frame), gain, atol=0.02)
-    found = model().foreground(frame, SETTINGS) > 0
+    found = model().foreground(frame, SETTINGS).mask > 0
     assert found[~mask].mean() < 0.01
     unfitted = dataclasses.replace(SETTINGS, mask_gain_fit=False, mask_shadow_test=False)
-    assert (model().foreground(frame, unfitted) > 0)[~mask].mean() > 0.2
+    assert (model().foreground(frame, unfitted).mask > 0)[~mask].mean() > 0.2
 
 
 def test_grey_pictures_have_no_shadow_test() -> None:
@@ -147,7 +147,7 @@ def test_grey_pictures_have_no_shadow_test() -> None:
     assert background.is_grey
     dark = np.round(grey * 0.7).astype(np.uint8)
     fixed = dataclasses.replace(SETTINGS, mask_gain_fit=False)
-    assert (background.foreground(dark, fixed) > 0).mean() > 0.8
+    assert (background.foreground(dark, fixed).mask > 0).mean() > 0.8
     assert not model().is_grey
 
 
@@ -180,7 +180,7 @@ def test_median_and_deviation_are_numpys() -> None:
 def test_opencvs_models_find_the_person(kind: str) -> None:
     background = SubtractorBackground(kind, [seen(ROOM, seed) for seed in range(100, 140)])
     frame, mask = scene(1)
-    found = background.foreground(frame, SETTINGS) > 0
+    found = background.foreground(frame, SETTINGS).mask > 0
     assert found[mask].mean() > 0.95
     assert found[~mask].mean() < 0.05
 
@@ -190,11 +190,11 @@ def test_opencvs_masks_depend_on_the_frame_alone(kind: str) -> None:
     training = walking(20)
     frames = [scene(seed)[0] for seed in range(12)]
     one, other = SubtractorBackground(kind, training), SubtractorBackground(kind, training)
-    first = [one.foreground(frame, SETTINGS) for frame in frames]
+    first = [one.foreground(frame, SETTINGS).mask for frame in frames]
     touched = dataclasses.replace(SETTINGS, mask_threshold=2.0, mask_shadow_test=False)
     for number in (5, 11, 0, 3, 3, 7, 1, 10, 2, 4, 6, 8, 9):
         other.foreground(frames[number], touched)
-        np.testing.assert_array_equal(other.foreground(frames[number], SETTINGS), first[number])
+        np.testing.assert_array_equal(other.foreground(frames[number], SETTINGS).mask, first[number])
 
 
 @pytest.mark.parametrize(("threshold", "noise"), [(4.0, 4.0), (1.0, 2.0), (0.5, 0.5)])
@@ -211,4 +211,6 @@ def test_differences_are_those_of_every_pixel(threshold: float, noise: float) ->
     limit = np.float32(threshold**2) * np.maximum(deviation**2, np.float32(noise**2))
     expected = np.where((away * away > limit).any(axis=2), 255, 0)
     assert 0.02 < np.mean(expected > 0) <= 1.0
-    np.testing.assert_array_equal(GaussianBackground(mean, deviation).foreground(picture, settings), expected)
+    np.testing.assert_array_equal(
+        GaussianBackground(mean, deviation).foreground(picture, settings).mask, expected
+    )

@@ -140,7 +140,7 @@ def test_background_subtraction_leaves_holes_and_shadows(cameras: tuple[Camera, 
         model = gaussian_from_frames([renderer.empty(index, at) for at in range(recipe.picture.empty_frames)])
         for frame in (0, 120, 240, 380):
             picture, exact = renderer.picture(index, frame, renderer.shadow(frame))
-            found, exact = cleaned(model.foreground(picture, settings), settings) > 0, exact > 0
+            found, exact = cleaned(model.foreground(picture, settings).mask, settings) > 0, exact > 0
             shares.append(np.count_nonzero(found & exact) / np.count_nonzero(found | exact))
             missing.append(np.count_nonzero(exact & ~found) / np.count_nonzero(exact))
             extra.append(np.count_nonzero(found & ~exact) / np.count_nonzero(exact))

@@ -179,7 +179,9 @@ class _Cleaning:
         else:
             model, doubtful, rough_masks = combination(plate, stack, camera.width / middle.width)
         settings = reduced_cleaning(self.settings, camera.width / middle.width)
-        masks = [reduced(cleaned(model.foreground(picture, settings), settings), small) for picture in stack]
+        masks = [
+            reduced(cleaned(model.foreground(picture, settings).mask, settings), small) for picture in stack
+        ]
         first = _First(_rounded(model.mean), doubtful.astype(np.uint8), rough_masks)
         return first, seen, masks
 
@@ -194,7 +196,7 @@ class _Cleaning:
             _filled_in(picture, (empty < FEWEST_EMPTY) & (doubtful > 0), max(1, round(FILLING / factor)))
         )
         settings = reduced_cleaning(self.settings, factor)
-        return [cleaned(background.foreground(seen, settings), settings) for seen in pictures]
+        return [cleaned(background.foreground(seen, settings).mask, settings) for seen in pictures]
 
     def _covers(self, masks: Sequence[Sequence[Bytes]], carvers: Sequence[Reconstructor]) -> list[Bytes]:
         """(K, h, w) of each camera, 1 where the others' hull may hide the background in a frame.

@@ -101,7 +101,7 @@ def test_background_subtraction_finds_the_person_nearly_whole() -> None:
             reader.close()
             for frame in (20, 110):
                 _, exact = renderer.picture(0, frame, renderer.shadow(frame))
-                found = cleaned(model.foreground(footage.picture(name, frame), settings), settings)
+                found = cleaned(model.foreground(footage.picture(name, frame), settings).mask, settings)
                 both = np.count_nonzero((found > 0) & (exact > 0))
                 shares.append(both / np.count_nonzero((found > 0) | (exact > 0)))
     finally:

@@ -66,7 +66,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         body, beside = _without_rim(truth)
         for name, knobs in CHOICES.items():
             settings = dataclasses.replace(EvidenceSettings(), **knobs)
-            mask = cleaned(background.foreground(picture, settings), settings) > 0
+            mask = cleaned(background.foreground(picture, settings).mask, settings) > 0
             counted[name] += [(body & ~mask).sum(), (beside & mask).sum(), body.sum()]
     return {name: [int(value) for value in values] for name, values in counted.items()}
 

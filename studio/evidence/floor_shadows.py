@@ -1,0 +1,312 @@
+"""Which pixels that look like a shadow cannot be one: the floor that they would lie on is seen empty from elsewhere.
+
+The shadow test of one camera (`background`) cannot tell a forearm on a floor of its own colour from a darker floor. The
+other cameras can. A shadow on the floor z = 0 is changed for every camera that sees that place of the floor. Where one
+sees the place unchanged, what hides it from the first camera stands above the floor: on the pixel's ray, at a place
+that every camera sees changed. Pixels for which both holds are the subject's. All is decided on cells of some pixels.
+
+Where the floor is not at z = 0, as on a table or a stage, shadows would be taken for the subject. So where all that
+changed stays clearly above z = 0, the floor is what is lowest of it. Lengths are shares of the distance between the
+cameras and what they look at, so that a mouse's cage is treated as a hall.
+"""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.evidence.volume.hull_projection import distorted
+from studio.foundations.arrays import Array, Bytes
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.numba_in_threads import EXACT, njit
+
+CELLS = 320
+"""Cells along the longer side of a picture."""
+CHANGED_SHARE, SHADOW_SHARE = 0.375, 0.5
+"""Of a cell's area, so that it counts as changed; of what changed in it, so that it counts as like a shadow."""
+SAME, CHANGED, LIKE_SHADOW = 0, 1, 2
+STEP, ABOVE, FARTHEST = 0.012, 0.03, 1.5
+"""Shares of the distance: between places on a ray, of the lowest place above the floor, of the farthest from what the
+cameras look at."""
+ALIKE = 0.01
+"""Least mean square sine between the cameras' axes and any direction: below it, within 6 degrees, all look one way."""
+SEEING = 2
+"""Other cameras that see a place, at least; of two cameras the other one."""
+SAMPLED, LOWER, AROUND = 800, 0.03, 0.05
+"""About so many changed cells tell where the scene is; which of their lowest places, in order of height, is the floor
+at most; share of the distance by which the scene is larger."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """A picture's cells. kinds : (h, w) SAME, CHANGED or LIKE_SHADOW. size : pixels along a cell's side."""
+
+    kinds: Bytes
+    size: int
+
+
+def cells_of(mask: Bytes, shadow: Bytes | None) -> Cells:
+    """mask : (H, W) 0 or 255. shadow : (H, W) 255 where a pixel changed but passes for shadow; None: nowhere."""
+    height, width = mask.shape
+    size = max(1, -(-max(height, width) // CELLS))
+    kinds = np.zeros((-(-height // size), -(-width // size)), np.uint8)
+    changed = mask if shadow is None else mask | shadow
+    left, top, across, down = cv2.boundingRect(changed)
+    if not across:
+        return Cells(kinds, size)
+    # Whole cells around all that changed: a picture is mostly empty.
+    left, top, right, bottom = (
+        left // size,
+        top // size,
+        -(-(left + across) // size),
+        -(-(top + down) // size),
+    )
+
+    def shares(picture: Bytes) -> NDArray[np.float32]:
+        part = picture[top * size : bottom * size, left * size : right * size]
+        beyond = (bottom - top) * size - part.shape[0], (right - left) * size - part.shape[1]
+        whole = (
+            cv2.copyMakeBorder(part, 0, beyond[0], 0, beyond[1], cv2.BORDER_CONSTANT) if any(beyond) else part
+        )
+        small = cv2.resize(whole, (right - left, bottom - top), interpolation=cv2.INTER_AREA)
+        return np.asarray(small, np.float32) / np.float32(255.0)
+
+    everything = shares(changed)
+    passing = np.zeros_like(everything) if shadow is None else shares(shadow)
+    kinds[top:bottom, left:right] = np.where(
+        everything < CHANGED_SHARE,
+        SAME,
+        np.where(passing >= SHADOW_SHARE * everything, LIKE_SHADOW, CHANGED),
+    )
+    return Cells(kinds, size)
+
+
+def with_cells(mask: Bytes, shadow: Bytes, chosen: Bytes, size: int) -> Bytes:
+    """A mask (H, W) with what passes for shadow in some cells. chosen : (h, w) above 0. size : of a cell, pixels."""
+    if not chosen.any():
+        return mask
+    whole = cv2.resize(chosen, None, fx=size, fy=size, interpolation=cv2.INTER_NEAREST)
+    rows, columns = mask.shape
+    return np.where(whole[:rows, :columns] > 0, mask | shadow, mask)
+
+
+@functools.lru_cache(maxsize=8)
+def floor_shadows(cameras: tuple[Camera, ...]) -> "FloorShadows":
+    """That of some cameras, kept."""
+    return FloorShadows(cameras)
+
+
+class FloorShadows:
+    """Tells floor shadows from what only looks like one, in all pictures of a frame; immutable.
+
+    usable : whether there are cameras that look from several sides, all above z = 0.
+    """
+
+    def __init__(self, cameras: Sequence[Camera]) -> None:
+        self._cameras = tuple(cameras)
+        self._views = np.array(
+            [
+                np.concatenate(
+                    [
+                        camera.matrix[:2].ravel(),
+                        camera.distortion,
+                        camera.rotation.ravel(),
+                        camera.translation,
+                        camera.centre,
+                    ]
+                )
+                for camera in cameras
+            ]
+        )
+        centres = np.array([camera.centre for camera in cameras])
+        self._middle, self._distance = _middle_seen(
+            centres, np.array([camera.rotation[2] for camera in cameras])
+        )
+        self.usable = bool((centres[:, 2] > ABOVE * self._distance).all())
+        self._rays = functools.cache(self._rays_of)
+
+    def unexplained(self, seen: Sequence[Cells]) -> list[Bytes]:
+        """For each camera (h, w) above 0 where a cell looks like a shadow and cannot be one. seen : one a camera."""
+        kinds = [cells.kinds.ravel() for cells in seen]
+        chosen = [np.zeros_like(cells.kinds) for cells in seen]
+        like = [np.flatnonzero(own == LIKE_SHADOW) for own in kinds]
+        owners = np.repeat(np.arange(len(seen)), [len(own) for own in like])
+        if not len(owners):
+            return chosen
+        rays = np.concatenate(
+            [
+                self._rays(number, *cells.kinds.shape, cells.size)[like[number]]
+                for number, cells in enumerate(seen)
+            ]
+        )
+        everything, maps = np.concatenate(kinds), _maps(seen)
+        scene, least = self._scene(everything, seen, maps), min(SEEING, len(seen) - 1)
+        if scene is None:
+            return chosen
+        # A calibration is not exact: beside what has changed a place is not seen unchanged.
+        near = np.concatenate([cv2.dilate(cells.kinds, np.ones((3, 3), np.uint8)).ravel() for cells in seen])
+        explained = on_floor(near, maps, self._views, owners, rays, scene[0, 2])
+        scene[0, 2] += ABOVE * self._distance
+        places = lowest_changed(
+            everything, maps, self._views, owners, rays, explained, scene, STEP * self._distance, least
+        )
+        anywhere = np.isfinite(places[:, 2])
+        for number, own in enumerate(like):
+            chosen[number].ravel()[own[anywhere[owners == number]]] = 1
+        return chosen
+
+    def _scene(self, kinds: Bytes, seen: Sequence[Cells], maps: NDArray[np.int64]) -> Array | None:
+        """(2, 3) mm, a box around what changed, upwards from the floor; None without any. The floor is at 0, or, where
+        all that changed stays clearly above, at what is lowest of it.
+        """
+        changed = [np.flatnonzero(cells.kinds) for cells in seen]
+        stride = 1 + sum(map(len, changed)) // SAMPLED
+        changed = [own[::stride] for own in changed]
+        rays = np.concatenate(
+            [
+                self._rays(number, *cells.kinds.shape, cells.size)[own]
+                for number, (cells, own) in enumerate(zip(seen, changed, strict=True))
+            ]
+        )
+        owners = np.repeat(np.arange(len(seen)), [len(own) for own in changed])
+        reach = FARTHEST * self._distance
+        anywhere = np.array([[-reach, -reach, 0.0], [reach, reach, reach]]) + self._middle * (1.0, 1.0, 0.0)
+        places = lowest_changed(
+            kinds,
+            maps,
+            self._views,
+            owners,
+            rays,
+            np.zeros(len(rays), np.bool_),
+            anywhere,
+            STEP * self._distance,
+            min(SEEING, len(seen) - 1),
+        )
+        places = places[np.isfinite(places[:, 2])]
+        if not len(places):
+            return None
+        around = AROUND * self._distance
+        box = np.stack([places.min(axis=0) - around, places.max(axis=0) + around])
+        lowest = float(np.quantile(places[:, 2], LOWER))
+        box[0, 2] = lowest if lowest > ABOVE * self._distance else 0.0
+        return box
+
+    def _rays_of(self, number: int, high: int, wide: int, size: int) -> Array:
+        """(h * w, 3) directions of unit length through a camera's cells."""
+        camera = self._cameras[number]
+        rows, columns = np.indices((high, wide))
+        places = np.stack([columns.ravel(), rows.ravel()], axis=1) * float(size) + 0.5 * (size - 1)
+        flat = cv2.undistortPoints(places[:, None], camera.matrix, camera.distortion)[:, 0]
+        rays = np.column_stack([flat, np.ones(len(flat))]) @ camera.rotation
+        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+def _middle_seen(centres: Array, axes: Array) -> tuple[Array, float]:
+    """(3,) mm, the place that the axes (V, 3) of cameras at (V, 3) come nearest to, and their median distance from it;
+    infinite for a single camera and where all look the same way.
+    """
+    across = (np.eye(3) - axes[:, :, None] * axes[:, None, :]).mean(axis=0)
+    if np.linalg.eigvalsh(across)[0] < ALIKE:
+        return np.zeros(3), np.inf
+    along = np.einsum("vi,vi->v", axes, centres)[:, None] * axes
+    place = np.linalg.solve(across, (centres - along).mean(axis=0))
+    return place, float(np.median(np.linalg.norm(centres - place, axis=1)))
+
+
+def _maps(seen: Sequence[Cells]) -> NDArray[np.int64]:
+    """(V, 4) where a camera's cells begin among all, their rows and columns, and their size, pixels."""
+    begin, maps = 0, np.zeros((len(seen), 4), np.int64)
+    for own, cells in zip(maps, seen, strict=True):
+        own[:] = (begin, *cells.kinds.shape, cells.size)
+        begin += cells.kinds.size
+    return maps
+
+
+@njit(**EXACT)
+def seen_at(
+    kinds: Bytes, maps: NDArray[np.int64], views: Array, owner: int, x: float, y: float, z: float
+) -> int:
+    """How many other cameras than `owner` see a place (mm) changed; -1 if one sees it unchanged. maps : of `_maps`.
+    views : (V, 26) K's rows, distortion, rotation, translation and centre.
+    """
+    count = 0
+    for other in range(len(maps)):
+        if other == owner:
+            continue
+        view = views[other]
+        depth = view[17] * x + view[18] * y + view[19] * z + view[22]
+        if depth <= 0.0:
+            continue
+        across = (view[11] * x + view[12] * y + view[13] * z + view[20]) / depth
+        down = (view[14] * x + view[15] * y + view[16] * z + view[21]) / depth
+        xd, yd, radial = distorted(across, down, (view[6], view[7], view[8], view[9], view[10]))
+        if not radial > 0.0:
+            continue
+        begin, high, wide, size = maps[other]
+        column = (view[0] * xd + view[1] * yd + view[2] + 0.5) / size
+        row = (view[4] * yd + view[5] + 0.5) / size
+        if not (0.0 <= column < wide and 0.0 <= row < high):
+            continue
+        if kinds[begin + int(row) * wide + int(column)] == SAME:
+            return -1
+        count += 1
+    return count
+
+
+@njit(**EXACT)
+def on_floor(
+    kinds: Bytes, maps: NDArray[np.int64], views: Array, owners: NDArray[np.int64], rays: Array, height: float
+) -> NDArray[np.bool_]:
+    """(K,) whether no other camera sees the floor behind a cell unchanged, at a height, mm. kinds : of all cells, those
+    beside changed ones too. maps, views : as of `seen_at`. owners : (K,) the cells' cameras. rays : (K, 3).
+    """
+    explained = np.zeros(len(rays), np.bool_)
+    for k in range(len(rays)):
+        ray, centre = rays[k], views[owners[k], 23:]
+        if ray[2] < 0.0:
+            along = (height - centre[2]) / ray[2]
+            x, y = centre[0] + along * ray[0], centre[1] + along * ray[1]
+            explained[k] = seen_at(kinds, maps, views, owners[k], x, y, height) >= 0
+    return explained
+
+
+@njit(**EXACT)
+def lowest_changed(
+    kinds: Bytes,
+    maps: NDArray[np.int64],
+    views: Array,
+    owners: NDArray[np.int64],
+    rays: Array,
+    explained: NDArray[np.bool_],
+    box: Array,
+    step: float,
+    least: int,
+) -> Array:
+    """(K, 3) mm, the lowest place on a cell's ray in a box (2, 3) that all cameras which see it see changed, `least`
+    others or more; infinite without one, and where the floor explains the cell. step : mm between places.
+    """
+    places = np.full((len(rays), 3), np.inf)
+    for k in range(len(rays)):
+        if explained[k]:
+            continue
+        ray, centre = rays[k], views[owners[k], 23:]
+        first, last = 0.0, np.inf
+        for axis in range(3):
+            one, other = (box[0, axis] - centre[axis]) / ray[axis], (box[1, axis] - centre[axis]) / ray[axis]
+            first, last = max(first, min(one, other)), min(last, max(one, other))
+        # From the far end, which is the lower one unless a camera looks up.
+        along = last
+        while along > first:
+            x, y, z = (
+                centre[0] + along * ray[0],
+                centre[1] + along * ray[1],
+                centre[2] + along * ray[2],
+            )
+            if seen_at(kinds, maps, views, owners[k], x, y, z) >= least:
+                places[k, 0], places[k, 1], places[k, 2] = x, y, z
+                break
+            along -= step
+    return places
