@@ -148,6 +148,24 @@ def test_exchanged_legs_are_corrected_in_pairs() -> None:
     assert steps.evaluations > 1000
 
 
+def test_a_limb_without_a_twin_is_searched_alone_and_stays_where_no_other_pose_of_it_is_possible() -> None:
+    at, rest = NAMES.index("head_turn"), BODY.neutral
+
+    class Turned(NearMarkers):
+        def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
+            return -10.0 * (poses[:, at] - 0.7) ** 2
+
+    class OnlyAtRest(Turned):
+        def feasible(self, poses: Array, *, limbs_apart: bool = False) -> NDArray[np.bool_]:
+            return poses[:, at] == rest[at]
+
+    for kind, wanted in ((Turned, 0.7), (OnlyAtRest, 0.0)):
+        steps = LineSteps(AtEase.of(kind(rest), SPACE, rest, 4), SPACE, rest)
+        line = Line(rest, float(steps.values(rest[None])[0]))
+        found = steps.improved(np.random.default_rng(0), line, [], np.zeros(len(rest)), Round(1, 30, 4, 0.2))
+        assert found.pose[at] == pytest.approx(wanted, abs=0.05)
+
+
 def test_the_penalty_of_attitudes_far_from_rest() -> None:
     problem = NearMarkers(BODY.neutral)
     eased = AtEase.of(problem, SPACE, BODY.neutral, 4)
