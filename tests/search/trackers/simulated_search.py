@@ -27,6 +27,7 @@ COUNT, LAST = 12, 5
 SEEDS = (3, 1 << 40)
 PLAN = LayerPlan(0.4, Noise(None, 0.6, 0.8, correlated=True), crossed=0.7)
 SETTINGS = AnnealedSettings(layers=3, particles=COUNT, crossover=0.5)
+OF_FRAMES = (SETTINGS, dataclasses.replace(SETTINGS, crossover_by="parameters"))
 
 
 def problem_of(device):
@@ -104,7 +105,7 @@ def searches(found):
             space,
             seed=5,
             frame=frame,
-            settings_source=lambda: (0, SETTINGS),
+            settings_source=lambda settings=OF_FRAMES[frame]: (0, settings),
             repeats=2 - frame,
             on_layer=records.append,
         ).carried

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from simulated_card import run_simulated
-from simulated_search import COUNT, LAST, PLAN, SEEDS, SETTINGS, last_set, problem_of
+from simulated_search import COUNT, LAST, OF_FRAMES, PLAN, SEEDS, SETTINGS, last_set, problem_of
 
 from studio.foundations import numba_on_devices
 from studio.foundations.errors import RunError, StudioError
@@ -147,7 +147,9 @@ def test_a_frame_is_searched_on_the_card_and_goes_on_elsewhere(simulated, proble
 
 
 def test_a_frame_is_the_processors_but_for_rounding(simulated, problem):
-    """The same seed is the same search: every particle of every layer, in a run's first two frames."""
+    """The same seed is the same search: every particle of every layer, in a run's first two frames, which cross
+    by limbs and by parameters.
+    """
     weighting, space, poses = problem
     found, previous = [], start_of(tuple(poses[0]))
     for frame in range(2):
@@ -158,7 +160,7 @@ def test_a_frame_is_the_processors_but_for_rounding(simulated, problem):
             space,
             seed=5,
             frame=frame,
-            settings_source=lambda: (0, SETTINGS),
+            settings_source=lambda settings=OF_FRAMES[frame]: (0, settings),
             repeats=2 - frame,
             on_layer=found.append,
         )
