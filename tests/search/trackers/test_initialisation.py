@@ -12,7 +12,14 @@ from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError
 from studio.runs.search_space import default_sigma, search_space
 from studio.search.likelihood.hard_priors import HardPriors
-from studio.search.trackers.initialisation import QUICK, StartSearch, confidence, facing_odds, first_noise
+from studio.search.trackers.initialisation import (
+    QUICK,
+    Effort,
+    StartSearch,
+    confidence,
+    facing_odds,
+    first_noise,
+)
 from studio.search.trackers.start_candidates import HEADINGS, StartCandidates, facing, start_candidates
 from studio.search.trackers.start_lines import AtEase, Line, LineSteps, Round
 from studio.search.trackers.tracker import FrameLikelihood
@@ -107,6 +114,27 @@ def test_the_same_seed_gives_the_same_pose_and_progress_counts_up_to_its_end() -
     assert [done for done, _ in reports] == sorted(done for done, _ in reports)
     assert len({total for _, total in reports}) == 1
     assert reports[-1][0] <= reports[-1][1]
+
+
+def test_progress_counts_lines_and_begins_each_round_where_the_last_could_have_ended() -> None:
+    """Of one family and rounds of one line, each could have improved two more that face the other way."""
+    problem, reports = NearMarkers(BODY.neutral), list[tuple[int, int]]()
+    effort, progress = (
+        Effort(1, 3 * (Round(1, 4, 4, 0.2),)),
+        lambda done, total: reports.append((done, total)),
+    )
+    family = StartCandidates(BODY.neutral[None], np.zeros(1, np.int64), fixed=False)
+    StartSearch(
+        problem,
+        SPACE,
+        BODY.neutral,
+        lambda poses: facing(BODY, poses),
+        cameras=4,
+        seed=1,
+        effort=effort,
+        progress=progress,
+    ).run(family)
+    assert reports == [(1, 10), (2, 10), (5, 10), (8, 10)]
 
 
 @pytest.mark.slow
