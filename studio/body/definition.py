@@ -41,7 +41,7 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     scale_x = 1                       # of the cross-section; number or ratio
     scale_y = 1
     side = "left"                     # left, right or middle
-    part = ""                         # optional: "trunk" or "head", where a weighting treats these apart
+    part = ""                         # optional: "trunk" or "head", where a likelihood treats these apart
 
     [[markers]]                       # named points, between which a subject's lengths are given
     name = "LKnee"

@@ -72,7 +72,7 @@ class Limb:
     """A truncated elliptical cone along its joint's z, from z = 0 to z = length (which may be negative).
 
     radius_start, radius_end : mm at z = 0 and z = length. scale_x, scale_y : of the cross-section along local
-    x, y. side : "left", "right" or "middle" (colours). part : "trunk", "head" or "" (neither), for weightings
+    x, y. side : "left", "right" or "middle" (colours). part : "trunk", "head" or "" (neither), for likelihoods
     that treat these apart. Limbs of zero length are kept here but are not counted or drawn: see
     `BodyModel.drawn`.
     """

@@ -1,8 +1,8 @@
 """All knobs of a run in one frozen, versioned value.
 
-A run's settings are six groups: the tracker's, the weighting's, the evidence's, the refinement's, the recovery's and
-the recording's. Each knob has a flat name that is unique over the six, so that a slider, `--set name=value` and `PATCH
-/settings` need no group.
+A run's settings are six groups: the tracker's, the likelihood's (stored as *weighting*), the evidence's, the
+refinement's, the recovery's and the recording's. Each knob has a flat name that is unique over the six, so that a
+slider, `--set name=value` and `PATCH /settings` need no group.
 """
 
 import dataclasses
@@ -44,7 +44,7 @@ class RecordingSettings:
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """All settings of a run. tracker, weighting : of the settings_type of the tracker and weighting named."""
+    """All settings of a run. tracker, weighting : of the settings_type of the tracker and the likelihood named."""
 
     tracker_name: str
     weighting_name: str
@@ -98,7 +98,7 @@ class SettingsHistory:
 def default_settings(
     tracker_name: str = DEFAULT_TRACKER, weighting_name: str = DEFAULT_WEIGHTING
 ) -> RunSettings:
-    """The defaults of a tracker and a weighting; raises SettingsError for an unknown name of either, or for a
+    """The defaults of a tracker and a likelihood; raises SettingsError for an unknown name of either, or for a
     knob that two groups have.
     """
     tracker = TRACKERS[tracker_name].settings_type()
@@ -171,7 +171,7 @@ def values(settings: RunSettings) -> dict[str, Value]:
 
 
 def knob_table() -> tuple[Knob, ...]:
-    """Every knob that there is, of all trackers and weightings, for the guide; `group` says whose it is."""
+    """Every knob that there is, of all trackers and likelihoods, for the guide; `group` says whose it is."""
     types = [tracker.settings_type for tracker in TRACKERS.values()]
     types += [weighting.settings_type for weighting in WEIGHTINGS.values()]
     types += [EvidenceSettings, FrameRefinementSettings, RecoverySettings, RecordingSettings]

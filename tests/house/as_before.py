@@ -96,7 +96,7 @@ def _poses_and_exports() -> dict[str, str]:
     # What the walk's particles are guided by; the arm has no model, so that its runs of that kind are refused.
     model = workspace / "models" / "walking.behaviour"
     model.parent.mkdir()
-    studio.learn(["walk"], str(model), body="human31")
+    studio.learn([workspace / "walk" / "recipe.toml"], str(model), body="human31")
     hashes: dict[str, str] = {}
     for tracker in trackers:
         for likelihood in likelihoods:

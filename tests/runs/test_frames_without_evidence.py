@@ -113,7 +113,7 @@ def test_a_frame_without_a_finite_weight_ends_the_run_with_its_number(
             "log_likelihood",
             lambda self, poses, stage=0: whole(self, poses, stage) * np.nan,
         )
-        with pytest.raises(RunError, match=r"^Frame 2, layer 2: The weighting gave nan for a pose\."):
+        with pytest.raises(RunError, match=r"^Frame 2, layer 2: The likelihood gave nan for a pose\."):
             finish(session_on_disk, run)
     with run.results() as results:
         assert results.frames() == [0, 1]

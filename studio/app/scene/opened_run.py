@@ -1,12 +1,11 @@
 """A session and one of its runs, opened for display: the source of everything that the scene draws."""
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
+from cachetools import LRUCache
 from numpy.typing import NDArray
 
 from studio.app.scene.model import LiveSearch
@@ -63,8 +62,8 @@ class OpenedRun:
         self.fps: float = session.manifest.footage.fps
         self.results: ResultsReader | None = run.results() if run else None
         self.truth, self.truth_problem = _truth_of(session)
-        self._results: OrderedDict[int, FrameResult] = OrderedDict()
-        self._layers: OrderedDict[int, list[LayerRecord]] = OrderedDict()
+        self._results: LRUCache[int, FrameResult] = LRUCache(_KEPT_FRAMES)
+        self._layers: LRUCache[int, list[LayerRecord]] = LRUCache(_KEPT_FRAMES)
         self._track: tuple[tuple[str, int], Track | None] = (RAW, 0), None
 
     @property
@@ -91,7 +90,7 @@ class OpenedRun:
             if self.results is None:
                 return None
             try:
-                _keep(self._results, frame, self.results.result(frame))
+                self._results[frame] = self.results.result(frame)
             except NotFoundError:
                 return None
         return self._results[frame]
@@ -107,7 +106,7 @@ class OpenedRun:
         except NotFoundError:
             return []
         if self.result(frame) is not None:
-            _keep(self._layers, frame, layers)
+            self._layers[frame] = layers
         return layers
 
     def forget_from(self, frame: int) -> None:
@@ -237,12 +236,3 @@ def _truth_of(session: Session) -> tuple[MarkerMotion | None, str]:
 
 def _at_least(count: int, records: Sequence[LayerRecord]) -> int:
     return max(count, *(record.layer + 1 for record in records)) if records else count
-
-
-Kept = TypeVar("Kept")
-
-
-def _keep(store: OrderedDict[int, Kept], key: int, value: Kept) -> None:
-    store[key] = value
-    while len(store) > _KEPT_FRAMES:
-        store.popitem(last=False)

@@ -107,11 +107,6 @@ def root_of(parents, run):
     return run
 
 
-def largest_piece(hull: Hull) -> Hull:
-    numbers, _ = piece_numbers(hull)
-    return chosen_voxels(hull, numbers == 0)
-
-
 def chosen_voxels(hull: Hull, chosen: NDArray[np.bool_]) -> Hull:
     """The hull with only some of its voxels. chosen : (K,)."""
     return dataclasses.replace(

@@ -1,4 +1,4 @@
-"""The knobs of the blob weighting: carving of the hull, learning and fitting of blobs."""
+"""The knobs of the blobs' likelihood: carving of the hull, learning and fitting of blobs."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""Weighting by coloured Gaussian blobs (Caillette, Galata & Howard 2007, sections 6.2 to 6.4).
+"""The likelihood of coloured Gaussian blobs (Caillette, Galata & Howard 2007, sections 6.2 to 6.4).
 
 The masks become a visual hull, the hull a mixture of blobs fitted by K-means from where the body is expected, and a
 pose weighs 1 / D, D the relative entropy between the mixture that its own blobs make and the fitted one:
@@ -194,7 +194,7 @@ class ExpectedBlobs(BlobFrameLikelihood):
 
 
 def blob_mixture(problem: object) -> BlobMixture | None:
-    """The blobs fitted to a frame, for pictures of them; None for another weighting's frame and for an empty hull."""
+    """The blobs fitted to a frame, for pictures of them; None for another likelihood's frame and for an empty hull."""
     return problem.fitted.mixture if isinstance(problem, ExpectedBlobs) and problem.fitted else None
 
 

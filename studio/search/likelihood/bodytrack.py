@@ -1,4 +1,4 @@
-"""The score of PARSEC's bodytrack benchmark, published with the Lee-walk data, as a weighting.
+"""The score of PARSEC's bodytrack benchmark, published with the Lee-walk data, as a likelihood.
 
 E = E_edge + E_inside, lower is better; two plain averages over all samples pooled over limbs and cameras:
 

@@ -24,7 +24,7 @@ from studio.search.likelihood.template import TemplateLikelihood, TemplateSettin
 
 
 class Likelihood(Protocol):
-    """A weighting prepared for one body, some cameras and some settings."""
+    """A likelihood prepared for one body, some cameras and some settings."""
 
     def problem(self, evidence: FrameEvidence) -> FrameLikelihood:
         """One frame as a function of poses."""
@@ -36,7 +36,7 @@ class LossLimit:
     """How far below a run's usual weight a frame is lost (`search.trackers.loss_detection`).
 
     spread : usual standard deviation of the log weight over well tracked frames.
-    spreads : how many of them below the median is lost. The defaults are for a weighting that was not measured.
+    spreads : how many of them below the median is lost. The defaults are for a likelihood that was not measured.
     """
 
     spread: float = 0.1

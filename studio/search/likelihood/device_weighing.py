@@ -81,7 +81,7 @@ class FrameOnDevice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProblemOnDevice:
-    """One frame's weighting there.
+    """One frame's likelihood there.
 
     factors : of the edge, the region and the silhouette term. trunk : the limbs, by number, whose edges count alone
     while only the trunk is searched; None: all count. ranked : which row of the weights (2, N) a swarm maximises, 0 the

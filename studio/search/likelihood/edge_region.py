@@ -1,4 +1,4 @@
-"""Edge and region weighting of Deutscher & Reid 2005, section 4.2.
+"""The edge and region likelihood of Deutscher & Reid 2005, section 4.2.
 
     Σe = 1/N Σ (1 - p)²    over samples along the sides of the projected cones, p from the edge map  (Eq. 14)
     Σr = 1/N Σ (1 - p)²    over samples within them, p from the foreground map                       (Eq. 15)
@@ -75,7 +75,7 @@ BLOCKS_A_THREAD = 24
 
 @dataclass(frozen=True, slots=True)
 class EdgeRegionSettings:
-    """Knobs of the edge and region weighting. A frame's problem is made once, so all take effect with the
+    """Knobs of the edge and region likelihood. A frame's problem is made once, so all take effect with the
     next.
     """
 
@@ -229,7 +229,7 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
         return self._from_device("weights", poses, limbs, factors)
 
     def on_device(self) -> "ProblemOnDevice | None":
-        """This frame's weighting there, for a search that keeps its particles there; None where there is no device."""
+        """This frame's likelihood there, for a search that keeps its particles there; None where there is no device."""
         settings = self.likelihood.settings
         return self.problem_there((settings.edge_weight, settings.region_weight, 0.0), None, 1)
 

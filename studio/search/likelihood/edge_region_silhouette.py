@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class EdgeRegionSilhouetteSettings(EdgeRegionSettings):
-    """The knobs of the edge and region weighting, and the silhouette's. All take effect with the next frame."""
+    """The knobs of edges and region, and the silhouette's. All take effect with the next frame."""
 
     title: ClassVar[str] = "Edge, region and silhouette"
 

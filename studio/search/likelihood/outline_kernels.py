@@ -5,7 +5,7 @@ vectorises).
 A limb's outline in a view is four points: side A from its start to its end, and side B (Lee-walk README,
 "Limb outline in an image"): with u the unit vector across the limb as the camera sees it, A = (-r0 u, 0) to
 (-r1 u, length) and B = (+r0 u, 0) to (+r1 u, length), each projected once, lens distortion included. Samples
-between them are interpolated in the image by the weightings. Frames are twelve rows of sixteen lanes in one
+between them are interpolated in the image by the likelihoods. Frames are twelve rows of sixteen lanes in one
 flat array: distances between rows that the compiler knows are what lets it vectorise without checking for
 overlap.
 """

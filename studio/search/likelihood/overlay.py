@@ -1,4 +1,4 @@
-"""Overlay of a weighting's outlines and sample points on the pictures, the same ones that the kernels
+"""Overlay of a likelihood's outlines and sample points on the pictures, the same ones that the kernels
 read.
 """
 
@@ -34,7 +34,7 @@ class ViewOverlay:
 
     camera : its name. limbs : L names. outlines : (L, 4, 2) corners A0, A1, B1, B0, NaN for a limb that is
     not seen. contours : L closed polylines (K, 2), sides and the half ellipses at both ends; (0, 2) for a
-    limb that is not seen. edge_samples, region_samples : (K, 2) points inside the picture that the weighting
+    limb that is not seen. edge_samples, region_samples : (K, 2) points inside the picture that the likelihood
     reads, before they are rounded to the nearest pixel; none for the template, which reads all pixels."""
 
     camera: str
@@ -60,11 +60,11 @@ def overlay_points(
     body: BodyModel,
     cameras: tuple[Camera, ...],
     pose: Array,
-    settings: Any,  # noqa: ANN401 - any weighting's settings
+    settings: Any,  # noqa: ANN401 - any likelihood's settings
 ) -> tuple[ViewOverlay, ...]:
     """The overlay on each camera's picture for a pose (D,). Raises BodyError for a pose that does not fit.
 
-    settings : of the weighting in use; sample points are those of its kernels.
+    settings : of the likelihood in use; sample points are those of its kernels.
     """
     pose = np.asarray(pose, dtype=np.float64)
     projector = OutlineProjector.of_body(body, cameras)
@@ -91,7 +91,7 @@ def _edges_read(
     pose: Array,
     settings: Any,  # noqa: ANN401
 ) -> tuple[IntArray | None, NDArray[np.bool_]]:
-    """Edges (K, 3) as in `visible_edges` and (V, K, samples) which of their samples are visible, where the weighting
+    """Edges (K, 3) as in `visible_edges` and (V, K, samples) which of their samples are visible, where the likelihood
     uses them; else None.
     """
     if isinstance(settings, EdgeSilhouetteSettings):

@@ -18,7 +18,7 @@ from studio.search.likelihood.outlines import OutlineProjector
 if TYPE_CHECKING:
     from studio.search.likelihood.device_weighing import ProblemOnDevice
 
-# Stages of a search: which part of the body a weighting uses.
+# Stages of a search: which part of the body a likelihood uses.
 WHOLE_BODY, TRUNK_FIRST = 0, 1
 
 
@@ -59,10 +59,10 @@ class FrameLikelihood(Protocol):
 
 
 class Preparation:
-    """A weighting prepared for one body, some cameras and some settings; makes that of any frame; immutable."""
+    """A likelihood prepared for one body, some cameras and some settings; makes that of any frame; immutable."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: Any) -> None:  # noqa: ANN401
-        """settings : the weighting's own. Raises FootageError for a camera whose pictures are too large."""
+        """settings : the likelihood's own. Raises FootageError for a camera whose pictures are too large."""
         check_sizes(cameras)
         self.settings, self.cameras = settings, cameras
         self.projector = OutlineProjector.of_body(body, cameras)
@@ -84,11 +84,11 @@ class BaseFrameLikelihood(ABC):
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
-        """(N,) the log-weights of poses (N, D), where the weighting defines no other fitness."""
+        """(N,) the log-weights of poses (N, D), where the likelihood defines no other fitness."""
         return self.log_likelihood(poses, stage)
 
     def shares(self, poses: Array) -> Shares:
-        """What each camera and term adds to the log-weights of poses (N, D); in one piece where the weighting says no
+        """What each camera and term adds to the log-weights of poses (N, D); in one piece where the likelihood says no
         more.
         """
         return Shares((POOLED,), (WHOLE,), self.log_likelihood(poses)[:, None, None])
@@ -124,7 +124,7 @@ class WeighedOnDevice(Protocol):
     """A frame whose poses a card may weigh, so that a search can keep its particles there."""
 
     def on_device(self) -> "ProblemOnDevice | None":
-        """The frame's weighting there; None where the processor weighs."""
+        """The frame's likelihood there; None where the processor weighs."""
         ...
 
     def give_up_device(self, error: Exception) -> None:
@@ -147,5 +147,5 @@ class QualityMeasured(Protocol):
 
     @property
     def lost_evidence(self) -> bool:
-        """Whether `quality` is below the weighting's own threshold."""
+        """Whether `quality` is below the likelihood's own threshold."""
         ...

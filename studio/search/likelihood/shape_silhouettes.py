@@ -1,6 +1,6 @@
 """Fitness of many bodies of different sizes to the silhouettes of some frames, each body in its own poses.
 
-A weighting is prepared for one body, and preparing it costs more than weighing a pose. Here the body is a variable:
+A likelihood is prepared for one body, and preparing it costs more than weighing a pose. Here the body is a variable:
 the fixed motions between a body's joints and its cones' sizes are linear in its dimensions (a `KinematicProgram` folds
 constant turns and moves, only the moves have dimensions in them), so a body's program is the first body's plus a sum,
 and sixteen poses of each body are one block of the outline kernel. The fit is the exact bidirectional silhouette

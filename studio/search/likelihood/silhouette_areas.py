@@ -32,7 +32,7 @@ BLOCKS_A_THREAD = 16
 
 
 def resolution_knob() -> Any:  # noqa: ANN401 - as `knob` itself
-    """The knob of the silhouettes' resolution, the same for all weightings that have it."""
+    """The knob of the silhouettes' resolution, the same for all likelihoods that have it."""
     return next_frame_knob(
         HALF,
         choices=(HALF, FULL),

@@ -1,4 +1,4 @@
-"""A rendered template against a silhouette: the weighting of Deutscher & Reid 2005, section 6.1 (Figs. 11 to
+"""A rendered template against a silhouette: the likelihood of Deutscher & Reid 2005, section 6.1 (Figs. 11 to
 18).
 
 The limbs are drawn as filled quadrilaterals, their projected outlines; a pixel belongs to the template where

@@ -1,4 +1,4 @@
-"""The annealing schedule: how peaked the weighting is in each layer (Deutscher & Reid 2005, section 3.1).
+"""The annealing schedule: how peaked the weights are in each layer (Deutscher & Reid 2005, section 3.1).
 
 Symbols: w, a particle's weight; β, the exponent of a layer, w_m = w^β (Eq. 3); π, the weights normalised to
 sum 1 (Eq. 6); D = 1 / Σ π², the survival diagnostic (Eq. 11); α = D / N, the survival rate (Eq. 12). D falls

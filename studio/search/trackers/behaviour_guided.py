@@ -7,9 +7,9 @@ from it, in the same one they move on with the cluster's own uncertainty (Eq. 4)
 get Gaussian noise. Every particle is weighed once, and the best of them is the pose. What particles carry:
 `guided_particles`; those that no model moves, beyond the paper: `model_free`.
 
-Weights: the paper normalises w as it is (section 6.4). Most weightings are no likelihoods and nearly flat as they are,
-so by default w^β is used, with β such that a chosen share of the particles survives the next draw (Deutscher & Reid
-2005, Eq. 3 and 12); β stands in the record.
+Weights: the paper normalises w as it is (section 6.4). Most weights are no likelihoods in the strict sense and nearly
+flat as they are, so by default w^β is used, with β such that a chosen share of the particles survives the next draw
+(Deutscher & Reid 2005, Eq. 3 and 12); β stands in the record.
 
 Without a model in the search space the tracker is a particle filter with noise of σ0; runs are not made so
 (`runs.behaviour_models`).

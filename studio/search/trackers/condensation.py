@@ -2,11 +2,11 @@
 
 A frame is one layer: survivors of the last frame are drawn by weight, moved, spread by σ0 and weighed once.
 
-The weighting of Eq. 17 is no likelihood: with its bare exponent the weights are nearly flat and nothing is
-selected. So that the comparison is fair, log w is multiplied by a scale that is chosen on the first frames:
-in each of them the β is found with which a chosen share of the particles survives (Eq. 12), and their
-geometric mean is used from then on. The scale in use stands in every record as `beta`, and travels with the
-particles as `extra["log_scales"]`.
+The weight of Eq. 17 is no likelihood in the strict sense: with its bare exponent the weights are nearly flat and
+nothing is selected. So that the comparison is fair, log w is multiplied by a scale that is chosen on the first frames:
+in each of them the β is found with which a chosen share of the particles survives (Eq. 12), and their geometric mean is
+used from then on. The scale in use stands in every record as `beta`, and travels with the particles as
+`extra["log_scales"]`.
 """
 
 import math

@@ -5,13 +5,13 @@ Three answers:
 - *No evidence*: nothing of a body's size is in any mask, or every picture is blank (a covered lens, a dead signal,
   where background subtraction sees foreground everywhere). The pose is held.
 - *Lost*: the best log weight is far below what it was in well tracked frames of this run, or the silhouettes of model
-  and mask hardly overlap. How far is too far differs with the weighting; the limits were measured (below).
+  and mask hardly overlap. How far is too far differs with the likelihood; the limits were measured (below).
 - *Tracked*: neither.
 
 The weight of a pose depends on clothes, light and masks as much as on the pose, so it is compared with the run's own
 median over its last well tracked frames, in units of their own spread (1.4826 × the median distance from the median)
-but never of less than the weighting's usual one (`Weighting.loss`). Overlap is f_s (`likelihood.silhouette_areas`): it
-means the same for every weighting, and serves in the first frames, before there is a distribution.
+but never of less than the likelihood's usual one (`Weighting.loss`). Overlap is f_s (`likelihood.silhouette_areas`): it
+means the same for every likelihood, and serves in the first frames, before there is a distribution.
 
 Measured with the annealed filter, 1000 evaluations, on rendered footage: the twin of the Lee walk at 20 Hz, a circle
 seen by three cameras at 20 Hz, the bundled walk; masks by subtraction. Tracked: frames with a mean marker error below
@@ -19,7 +19,7 @@ seen by three cameras at 20 Hz, the bundled walk; masks by subtraction. Tracked:
 pose or 250 to 700 mm aside; found: those with less than 60 mm. Turned: of runs that start back to front. Each is
 taken as a frame alone; a run believes three in a row.
 
-    weighting                tracked: called lost   lost: missed   found: called lost   turned: called lost
+    likelihood               tracked: called lost   lost: missed   found: called lost   turned: called lost
     edge-region                     233: 0             156: 7           43: 0                60: 22
     edge-silhouette                 350: 0             145: 0           67: 1                60: 33
     edge-region-silhouette          344: 0             138: 0           48: 0                60: 34

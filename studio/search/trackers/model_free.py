@@ -5,7 +5,7 @@ Beyond the paper, which leaves open what to do with movements that are not in th
 first weighing both kinds are compared, and where the model's own weigh less the share grows.
 
 Comparing: weights are taken to the power with which a tenth of the set survives, so that the best of each kind count
-(the raw ones of most weightings are nearly flat, or so peaked that one particle has everything). w̄ is the mean weight
+(the raw ones of most likelihoods are nearly flat, or so peaked that one particle has everything). w̄ is the mean weight
 of a kind, and b = w̄_free / (w̄_free + w̄_guided) is the probability that the model is beaten, were both as likely
 before. b is smoothed over frames; the share is the knob's value while b <= 1/2 and grows with b, to `LARGEST` where b
 reaches 3/4, so that both kinds can always be compared.

@@ -72,13 +72,14 @@ def weigh(problem: FrameLikelihood, poses: Array, rules: SearchSettings) -> tupl
 
 
 def checked_values(values: Array, count: int) -> Array:
-    """A weighting's values for `count` poses as float64; raises WeightError unless there are `count` finite numbers."""
+    """A likelihood's values for `count` poses as float64; raises WeightError unless there are `count` finite
+    numbers."""
     raw = np.asarray(values, dtype=np.float64)
     if raw.shape != (count,) or not np.isfinite(raw).all():
         wrong = raw[~np.isfinite(raw)]
         raise WeightError(
-            f"The weighting gave {wrong[0] if wrong.size else raw.shape} for a pose.",
-            "Check the calibration and the start pose, or report this as a fault of the weighting.",
+            f"The likelihood gave {wrong[0] if wrong.size else raw.shape} for a pose.",
+            "Check the calibration and the start pose, or report this as a fault of the likelihood.",
         )
     return raw
 

@@ -119,7 +119,7 @@ class RefinementSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refined:
-    """A refined pose. pose : (D,). moved : False where the start was kept because the weighting would have lost.
+    """A refined pose. pose : (D,). moved : False where the start was kept because the likelihood would have fallen.
     gain : of the log-weight. steps : that were taken. matrix : (D, D) of the silhouettes' equations at `pose`
     (`Refiner.loss`), None where a likelihood had its say or there are no silhouettes.
     """

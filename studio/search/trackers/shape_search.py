@@ -45,7 +45,7 @@ STEP = 1e-4
 class ShapeSearchSettings:
     """How much is searched. particles : M. layers : in all. survival : share of particles that survive a layer.
 
-    pose_steps : how often the poses of a layer are improved. sought : initial samples of each limb, 0 for
+    pose_steps : how often the poses of a layer are improved. drawn : initial samples of each limb, 0 for
     none.
     """
 
@@ -53,7 +53,7 @@ class ShapeSearchSettings:
     layers: int = 40
     survival: float = 0.4
     pose_steps: int = 2
-    sought: int = 4096
+    drawn: int = 4096
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +111,7 @@ class ShapeSearch:
         rules, rng = self._settings, self._rng
         count = rules.particles
         before = self.fitness(np.zeros(len(self._sigma)), poses)
-        poses = self.sought(poses)
+        poses = self.draw_limbs(poses)
         first = _Population(np.zeros((count, len(self._sigma))), np.repeat(poses[None], count, axis=0))
         now = first
         kept: list[tuple[Array, Array]] = []
@@ -193,7 +193,7 @@ class ShapeSearch:
         now.poses = np.take_along_axis(tried, best[..., None, None], axis=2)[:, :, 0]
         now.fitness = np.take_along_axis(fitness, best[..., None], axis=2)[..., 0]
 
-    def sought(self, poses: Array) -> Array:
+    def draw_limbs(self, poses: Array) -> Array:
         """(F, D) the poses with each limb at its best of many samples (`lost_limbs`)."""
         shape = np.zeros((1, len(self._sigma)))
 
@@ -202,7 +202,7 @@ class ShapeSearch:
             shapes = np.repeat(shape, len(by_body), axis=0)
             return self._fitness(shapes, by_body).swapaxes(1, 2).reshape(len(tried), -1)
 
-        rest, tries = self._space.body.neutral, self._settings.sought
+        rest, tries = self._space.body.neutral, self._settings.drawn
         return lost_limbs_found(self._rng, fitness, poses, self._limbs, self._limits, rest, tries)
 
     def fitness(self, shape: Array, poses: Array) -> Array:

@@ -236,9 +236,9 @@ class Printed:
 class Preset:
     """Ready-made settings. name : shown on screen. help : its purpose, one sentence. own : knobs by flat name.
 
-    tracker, weighting, body : by name, that it is made for; "" fits any that has its knobs, and the session's body.
-    printed : of a paper's whole tracker, every knob of it among them. learning : the same of its behaviour model, by
-    knobs of learning.
+    tracker, weighting (a likelihood), body : by name, that it is made for; "" fits any that has its knobs, and the
+    session's body. printed : of a paper's whole tracker, every knob of it among them. learning : the same of its
+    behaviour model, by knobs of learning.
     """
 
     name: str
@@ -256,7 +256,7 @@ class Preset:
         return {**self.own, **{name: value for entry in self.printed for name, value in entry.sets.items()}}
 
     def fits(self, tracker: str, weighting: str) -> bool:
-        """Whether it is made for runs with that tracker and weighting."""
+        """Whether it is made for runs with that tracker and likelihood."""
         return self.tracker in ("", tracker) and self.weighting in ("", weighting)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studio.evidence.volume.hull import Hull
-from studio.evidence.volume.hull_pieces import largest_piece, piece_numbers
+from studio.evidence.volume.hull_pieces import chosen_voxels, piece_numbers
 from studio.evidence.volume.tracking_space import Box
 
 BOX = Box(np.array([-800.0, -800.0, 0.0]), np.array([800.0, 800.0, 1600.0]))
@@ -35,7 +35,7 @@ def test_an_empty_hull_is_handled() -> None:
     assert np.isnan(hull.top())
     assert hull.weights().shape == (0,)
     assert not hull.contains(np.zeros((3, 3))).any()
-    assert largest_piece(hull).empty
+    assert chosen_voxels(hull, piece_numbers(hull)[0] == 0).empty
 
 
 def test_points_lie_in_voxels_of_any_size() -> None:
@@ -55,7 +55,7 @@ def test_pieces_are_numbered_by_volume_and_corners_join() -> None:
     numbers, volumes = piece_numbers(hull)
     np.testing.assert_array_equal(numbers, [1, 0, 0, 1, 2])
     np.testing.assert_allclose(volumes, np.array([65, 2, 1]) * UNIT**3)
-    kept = largest_piece(hull)
+    kept = chosen_voxels(hull, piece_numbers(hull)[0] == 0)
     np.testing.assert_array_equal(kept.centres, hull.centres[[1, 2]])
     assert kept.colours.shape == (2, 3)
     assert kept.view_colours.shape == (2, 2, 3)

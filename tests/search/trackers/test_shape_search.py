@@ -59,7 +59,7 @@ def person() -> DrawnPerson:
 
 @pytest.mark.slow
 def test_silhouettes_agree_better_afterwards_and_a_seed_repeats(person: DrawnPerson) -> None:
-    settings = ShapeSearchSettings(particles=12, layers=10, sought=64)
+    settings = ShapeSearchSettings(particles=12, layers=10, drawn=64)
     found = search_of(person, settings).run(person.poses)
     again = search_of(person, settings).run(person.poses)
     assert (found.fitness > found.before + 0.02).all()
@@ -87,8 +87,8 @@ def test_a_lost_arm_is_found_again(person: DrawnPerson) -> None:
     lost = person.poses.copy()
     lost[:, names.index("left_shoulder_ry")] += 1.2
     lost[:, names.index("left_elbow_ry")] = -0.2
-    search = search_of(person, ShapeSearchSettings(sought=1024))
-    found = search.sought(lost)
+    search = search_of(person, ShapeSearchSettings(drawn=1024))
+    found = search.draw_limbs(lost)
     wrist = [marker.name for marker in person.body.markers].index("LWrist")
     there = marker_points(person.body, person.poses)[:, wrist]
     before = np.linalg.norm(marker_points(person.body, lost)[:, wrist] - there, axis=1)
@@ -151,7 +151,7 @@ def test_no_more_is_searched_than_the_settings_say(body: BodyModel) -> None:
     person = DrawnPerson(skeleton, 1750.0, body, cameras, frames, {}, pose[None])
 
     def counted(particles: int) -> int:
-        settings = ShapeSearchSettings(particles=particles, layers=4, pose_steps=1, sought=0)
+        settings = ShapeSearchSettings(particles=particles, layers=4, pose_steps=1, drawn=0)
         return search_of(person, settings).run(person.poses).evaluations
 
     assert 0 < counted(2) < counted(4)
