@@ -291,6 +291,19 @@ def test_a_mesh_beside_the_file_is_found(tmp_path: Path) -> None:
     assert middle == pytest.approx(np.linalg.norm([50.0, 50.0, 250.0]), abs=3.0)
 
 
+def test_a_mesh_that_is_nowhere_is_left_out_wherever_it_stands_in_its_link(tmp_path: Path) -> None:
+    lost = '<visual><geometry><mesh filename="lost.stl"/></geometry></visual>'
+    ball = '<collision><geometry><sphere radius="0.02"/></geometry></collision>'
+    bodies = [
+        load_body(str(written(tmp_path, f"{n}.urdf", GRIPPER.replace('<link name="lift"/>', link))))
+        for n, link in enumerate(
+            f'<link name="lift">{parts}</link>' for parts in (ball, ball + lost, lost + ball)
+        )
+    ]
+    assert len({tuple(limb.length for limb in body.limbs) for body in bodies}) == 1
+    assert ["'lost.stl' of 'lift'" in body.definition.source for body in bodies] == [False, True, True]
+
+
 def test_it_can_be_saved_as_a_body_file(tmp_path: Path) -> None:
     path = written(tmp_path, "walker.xml", WALKER)
     body = load_body(str(path))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studio.evidence.stroke_cut import StrokeCut
+from studio.evidence.stroke_cut import BINS, StrokeCut, _cells
 from studio.evidence.strokes import Stroke
 from studio.foundations.errors import FootageError
 
@@ -54,6 +54,17 @@ def test_a_stroke_outside_takes_away_what_it_covers() -> None:
     mask = cut.cut(picture(42), (half,))
     assert not mask[45, 53]
     assert mask[45, 35]
+
+
+def test_colours_fall_into_bins_of_luma_and_of_both_differences_of_colour() -> None:
+    """Grey in the middle of the differences, the strongest red, green, blue and yellow (BGR) at their ends."""
+    colours = [(200, 200, 200), (0, 0, 255), (0, 255, 0), (255, 0, 0), (0, 255, 255)]
+    cells = _cells(np.array([colours], np.uint8))[0]
+    luma, red, blue = np.unravel_index(cells, (BINS, BINS, BINS))
+    middle, most = BINS // 2, BINS - 1
+    assert luma.tolist() == [25, 9, 18, 3, 28]
+    assert red.tolist() == [middle, most, 0, 10, 21]
+    assert blue.tolist() == [middle, 5, 0, most, 0]
 
 
 def test_without_a_stroke_inside_nothing_is_cut() -> None:

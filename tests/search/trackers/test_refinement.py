@@ -137,6 +137,9 @@ def test_without_silhouettes_nothing_moves(body: BodyModel, truth: np.ndarray) -
     found = Refiner(body, CAMERAS, SETTINGS).refine(truth, seen)
     assert not found.moved
     assert np.array_equal(found.pose, truth)
+    at_rest = Refiner(body, CAMERAS, SETTINGS).frame_loss(body.neutral, ())(body.neutral)
+    assert at_rest[0] == 0.0
+    assert not at_rest[1].any()
 
 
 def test_refining_twice_gives_the_same(

@@ -14,7 +14,7 @@ from studio.results.drawing_footage.person import skeleton_of_height
 from studio.search.likelihood.shape_silhouettes import ShapePrograms, ShapeSilhouettes
 from studio.search.trackers.shape_prior import ShapePrior, ShapeSpreads
 from studio.search.trackers.shape_refinement import RefinedShape, ShapeRefiner
-from studio.search.trackers.shape_search import ShapeSearch, ShapeSearchSettings, tempered
+from studio.search.trackers.shape_search import ShapeSearch, ShapeSearchSettings, _Population, tempered
 
 SEEDS = range(1, 7)
 
@@ -79,6 +79,28 @@ def test_poses_follow_a_shape_so_that_limbs_stay(person: DrawnPerson) -> None:
     left = limb_ends(space.body_of(shape), pose[None]) - there
     carried = limb_ends(space.body_of(shape), (pose + follow @ shape)[None]) - there
     assert np.linalg.norm(carried) < 0.75 * np.linalg.norm(left)
+
+
+def test_shapes_scatter_as_the_population_does_and_at_least_by_a_share_of_their_spread_that_cools(
+    person: DrawnPerson, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search, covariances = search_of(person, ShapeSearchSettings()), []
+
+    class Recording:
+        def multivariate_normal(self, mean: np.ndarray, covariance: np.ndarray, count: int) -> np.ndarray:
+            covariances.append(covariance)
+            return np.zeros((count, len(mean)))
+
+    monkeypatch.setattr(search, "_rng", Recording())
+    sigma = search._prior.sigma
+    apart = np.stack([sigma, -sigma])
+    poses = np.repeat(person.poses[None], 2, axis=0)
+    for shapes, heat in ((0.0 * apart, 1.0), (0.0 * apart, 0.0), (apart, 0.0)):
+        search._moved(_Population(shapes, poses), layer=1, heat=heat)
+    warm, cold, wide = covariances
+    np.testing.assert_allclose(warm, np.diag((0.1 * sigma) ** 2))
+    np.testing.assert_allclose(cold, np.diag((0.02 * sigma) ** 2))
+    np.testing.assert_allclose(wide - cold, 0.3 * np.outer(sigma, sigma))
 
 
 def test_a_lost_arm_is_found_again(person: DrawnPerson) -> None:

@@ -9,7 +9,15 @@ from drawn_people import drawn_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.evidence.distance_maps import SilhouetteDistances, silhouettes_by_camera
-from studio.search.trackers.side_exchange import CHANGE, Exchange, best_path, kinds_of, with_sides_right
+from studio.search.trackers.side_exchange import (
+    CHANGE,
+    Exchange,
+    Kind,
+    _Work,
+    best_path,
+    kinds_of,
+    with_sides_right,
+)
 
 CAMERAS = ring_of_cameras(4, 320, 240)
 BODY = load_body("human29")
@@ -80,6 +88,28 @@ def test_a_body_that_faces_backwards_is_turned(walk: np.ndarray, shown) -> None:
     assert changes == (Exchange(0, len(walk) - 1, "front and back exchanged"),)
     assert changes[0].words == "frames 0 to 23: front and back exchanged"
     assert off(found, walk) < 15.0 < 150.0 < off(planted, walk)
+
+
+def test_frames_around_one_that_may_be_exchanged_are_examined_until_it_is_ruled_out(
+    walk: np.ndarray, shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The likeliest first, and in each the pose of a neighbour that explains clearly more."""
+    gains = [-1.0, -1.0, 0.1, 0.2, 0.3, 0.29, -0.2, -1.0, -1.0]
+    work = _Work(BODY, CAMERAS, FRAMES[:9], walk[:9], FPS, shown)
+    legs, offered = next(one for one in work._kinds if "leg" in one.what), []
+    known = work._kinds[legs]
+
+    def examine(_: Kind, row: int) -> None:
+        if np.isnan(known.losses[row]):
+            known.losses[row], known.wanted[row] = 1.0, walk[:1, :3]
+
+    monkeypatch.setattr(work, "_examine", examine)
+    monkeypatch.setattr(work, "_gain", lambda _, row: np.nan if np.isnan(known.losses[row]) else gains[row])
+    monkeypatch.setattr(work, "_offer", lambda _, row, pose, beside: offered.append((row, beside)))
+    examine(legs, 4)
+    work._examine_around(legs, np.zeros(9))
+    assert np.flatnonzero(np.isfinite(known.losses)).tolist() == [1, 2, 3, 4, 5, 6]
+    assert offered == [(3, 4), (6, 5), (2, 3), (1, 2)]
 
 
 def test_a_clip_without_silhouettes_is_unchanged(walk: np.ndarray) -> None:

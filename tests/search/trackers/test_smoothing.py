@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from studio.body.catalogue import load_body
 from studio.foundations.errors import SettingsError
@@ -68,6 +69,15 @@ def dense(
         matrix[3 * frame, 3 * frame] += 1.0 / noise[frame]
         right[3 * frame] += place / noise[frame]
     return np.linalg.solve(matrix, right)[::3], np.linalg.inv(matrix)[::3, ::3].diagonal()
+
+
+def test_the_model_is_that_of_white_jerk() -> None:
+    """Solved in closed form for a frame: exp F, and the integral of what jerk at each moment has become at its end."""
+    np.testing.assert_allclose(scipy.linalg.expm(np.eye(3, k=1)), TRANSITION)
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    left = (1.0 + nodes) / 2.0
+    effects = np.stack([left**2 / 2.0, left, np.ones(3)])
+    np.testing.assert_allclose((weights / 2.0 * effects) @ effects.T, JERK, rtol=1e-12)
 
 
 def test_it_is_the_dense_least_squares_solution_with_gaps_and_trust() -> None:
