@@ -2,8 +2,9 @@
 
 The shadow test of one camera (`background`) cannot tell a forearm on a floor of its own colour from a darker floor. The
 other cameras can. A shadow on the floor z = 0 is changed for every camera that sees that place of the floor. Where one
-sees the place unchanged, what hides it from the first camera stands above the floor: on the pixel's ray, at a place
-that every camera sees changed. Pixels for which both holds are the subject's. All is decided on cells of some pixels.
+sees the place unchanged, or it lies out of their sight, what hides it from the first camera may stand above the floor:
+on the pixel's ray, at a place that every camera sees changed. Pixels for which both holds are the subject's. All is
+decided on cells of some pixels.
 
 Where the floor is not at z = 0, as on a table or a stage, shadows would be taken for the subject. So where all that
 changed stays clearly above z = 0, the floor is what is lowest of it. Lengths are shares of the distance between the
@@ -38,6 +39,8 @@ SEEING = 2
 SAMPLED, LOWER, AROUND = 800, 0.03, 0.05
 """About so many changed cells tell where the scene is; which of their lowest places, in order of height, is the floor
 at most; share of the distance by which the scene is larger."""
+FLOORS = -0.06, 0.06, 0.005
+"""Shares of the distance, above what is lowest, at which a floor is looked for: first, last, step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,7 +151,13 @@ class FloorShadows:
             return chosen
         # A calibration is not exact: beside what has changed a place is not seen unchanged.
         near = np.concatenate([cv2.dilate(cells.kinds, np.ones((3, 3), np.uint8)).ravel() for cells in seen])
-        explained = on_floor(near, maps, self._views, owners, rays, scene[0, 2])
+        explained = on_floor(near, maps, self._views, owners, rays, 0.0)
+        if scene[0, 2] > 0.0:
+            # The lowest of what changed is where the floor may be, give or take what no camera sees below it.
+            for height in scene[0, 2] + self._distance * np.arange(*FLOORS):
+                other = on_floor(near, maps, self._views, owners, rays, height)
+                if other.sum() > explained.sum():
+                    explained, scene[0, 2] = other, height
         scene[0, 2] += ABOVE * self._distance
         places = lowest_changed(
             everything, maps, self._views, owners, rays, explained, scene, STEP * self._distance, least
@@ -260,8 +269,9 @@ def seen_at(
 def on_floor(
     kinds: Bytes, maps: NDArray[np.int64], views: Array, owners: NDArray[np.int64], rays: Array, height: float
 ) -> NDArray[np.bool_]:
-    """(K,) whether no other camera sees the floor behind a cell unchanged, at a height, mm. kinds : of all cells, those
-    beside changed ones too. maps, views : as of `seen_at`. owners : (K,) the cells' cameras. rays : (K, 3).
+    """(K,) whether other cameras see the floor behind a cell, at a height (mm), and none sees it unchanged. kinds : of
+    all cells, those beside changed ones too. maps, views : as of `seen_at`. owners : (K,) the cells' cameras. rays :
+    (K, 3).
     """
     explained = np.zeros(len(rays), np.bool_)
     for k in range(len(rays)):
@@ -269,7 +279,7 @@ def on_floor(
         if ray[2] < 0.0:
             along = (height - centre[2]) / ray[2]
             x, y = centre[0] + along * ray[0], centre[1] + along * ray[1]
-            explained[k] = seen_at(kinds, maps, views, owners[k], x, y, height) >= 0
+            explained[k] = seen_at(kinds, maps, views, owners[k], x, y, height) > 0
     return explained
 
 

@@ -6,7 +6,7 @@ expensive, so they are shared in `Backgrounds`. Cameras are independent but for 
 """
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -19,7 +19,7 @@ from studio.evidence.backgrounds import Backgrounds, FittedKind
 from studio.evidence.edges import bodytrack_edges, proximity_edges
 from studio.evidence.floor_shadows import Cells, cells_of, floor_shadows, with_cells
 from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence, ViewEvidence
-from studio.evidence.masks import cleaned
+from studio.evidence.masks import PackedMask, cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.evidence.threshold import between_thresholds
 from studio.footage.capture.footage import Footage
@@ -47,6 +47,18 @@ class RawMask:
     mask: Bytes
     to_clean: bool
     shadow: Bytes | None = None
+
+
+class PackedRaw:
+    """A raw mask in an eighth of its bytes."""
+
+    def __init__(self, raw: RawMask) -> None:
+        self._mask, self._to_clean = PackedMask(raw.mask), raw.to_clean
+        self._shadow = None if raw.shadow is None else PackedMask(raw.shadow)
+
+    def unpacked(self) -> RawMask:
+        shadow = None if self._shadow is None else self._shadow.unpacked()
+        return RawMask(self._mask.unpacked(), self._to_clean, shadow)
 
 
 class EvidenceMaker:
@@ -123,6 +135,23 @@ class EvidenceMaker:
             seen = {name: self._cells[name, frame] for name in present}
             raw = self._without({camera: raw}, seen)[camera]
         return self.finished_mask(camera, raw)
+
+    def views(
+        self, cameras: Sequence[str], frames: Sequence[int], progress: Callable[[int, int], None]
+    ) -> Iterator[tuple[str, int, ViewEvidence]]:
+        """Camera, frame and evidence of some views, camera by camera: only one camera's pictures are held. progress :
+        pictures done and their number.
+        """
+        looks = [*self.cameras, *cameras] if self._tests_floor() and not self.hull_of_pixels else [*cameras]
+        noted, total = len(looks) - len(cameras), len(looks) * len(frames)
+        for place, camera in enumerate(looks):
+            for number, frame in enumerate(frames):
+                progress(place * len(frames) + number, total)
+                if place >= noted:
+                    yield camera, frame, self.view(camera, frame)
+                elif camera not in self.footage.absent(frame):
+                    self.note(camera, frame)
+            self.release(camera)
 
     def note(self, camera: str, frame: int, raw: RawMask | None = None) -> None:
         """Keep what the other cameras' masks of the frame need of a camera, so that these can be made without it."""

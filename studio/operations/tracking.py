@@ -46,7 +46,7 @@ from studio.runs.live.live_replay import Comparison, prepare_replay
 from studio.runs.live.live_request import last_of
 from studio.runs.live.live_summary import LiveSummary, in_words, summary_of
 from studio.runs.new_run import DESPITE, Numbers, Pose, given_pose, own_knobs, prepare_run
-from studio.runs.sides import exchanged_sides
+from studio.runs.sides import corrections_of
 from studio.runs.tracks import pose_in_track, read_track
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.catalogue import TRACKERS
@@ -445,7 +445,7 @@ def _as_tracked(run: StoredRun, result: BatchResult | None) -> Tracked:
         result.seconds if result else float("nan"),
         result.evaluations_per_frame if result else 0,
         result.last_beta if result else float("nan"),
-        exchanged_sides(fresh),
+        corrections_of(fresh),
     )
 
 

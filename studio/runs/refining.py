@@ -15,7 +15,7 @@ from studio.foundations.progress import Progress, no_progress
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refined_frames import refined_frames
 from studio.runs.search_space import search_space
-from studio.runs.sides import put_sides_right
+from studio.runs.sides import correct_clip
 from studio.runs.tracks import (
     RAW,
     REFINED,
@@ -82,7 +82,7 @@ def refine_run(
     progress(step, 0, total)
     if not source and into != SIDES:
         with closing(ProblemSource(session, run.body(), run.cameras())) as problems:
-            put_sides_right(run, problems, lambda _: progress(step, 0, total))
+            correct_clip(run, problems, lambda _: progress(step, 0, total))
         track = read_track(run, best_track(run, (SIDES,)).name)
     refined = refined_frames(session, run, track, knobs, lambda done: progress(step, done, total))
     moved = int(np.count_nonzero((refined.poses != track.poses).any(axis=1)))

@@ -1,7 +1,8 @@
-"""Corrects exchanged sides (left and right, front and back) of a finished run (`search.trackers.side_exchange`).
+"""Corrects a finished run as a whole: doubtful limbs are bridged from both ends (`search.trackers.limb_bridging`), and
+exchanged sides, left and right, front and back, are put right (`search.trackers.side_exchange`).
 
-The tracked poses stay. If sides were exchanged, the corrected poses are the track "sides", with the exchanges in its
-`made_by`; otherwise there is no such track.
+The tracked poses stay. If anything was corrected, the corrected poses are the track "sides", with the corrections in
+its `made_by`; otherwise there is no such track.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,27 +30,29 @@ from studio.runs.tracks import (
     write_track,
 )
 from studio.search.trackers.hidden_areas import without_hidden
+from studio.search.trackers.limb_bridging import with_limbs_bridged
 from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.refinement import Distances, mm_at
 from studio.search.trackers.side_exchange import with_sides_right
+from studio.search.trackers.tracker import LIMB_LOST
 from studio.sessions.stored_run import StoredRun
 
 BORDER_POINTS = 150
 EXCHANGED = "exchanged"
-"""Entry of `made_by`: the exchanges, a line each."""
+"""Entry of `made_by`: the corrections, a line each."""
 
 
-def put_sides_right(
+def correct_clip(
     run: StoredRun, problems: FrameSource, read: Callable[[int], None] = lambda frame: None
 ) -> tuple[str, ...]:
-    """Check a run's sides and store the track "sides" if any were exchanged; returns the exchanges.
+    """Look at a run as a whole and store the track "sides" if anything is corrected; returns the corrections.
 
     Live runs and runs that play their footage back and forth are skipped. An up-to-date track stays. read : called with
     each frame read; its exception ends the work. Raises the errors of reading the footage.
     """
     if not can_be_looked_at(run):
         return ()
-    if known := exchanged_sides(run):
+    if known := corrections_of(run):
         return known
     track = read_track(run, RAW)
     evidence = partial(_look_at, problems, MaskSettings(run), read)
@@ -60,10 +63,16 @@ def put_sides_right(
             memory = results.result(frame).carried.memory
             return known_silhouettes(body, cameras, evidence(frame), poses[frame], memory)
 
-        corrected, changes = with_sides_right(
-            body, cameras, track.frames, track.poses, run.record.fps, silhouettes_of
+        named = [
+            results.result(int(frame)).limbs_lost if state == LIMB_LOST else ()
+            for frame, state in zip(track.frames, track.states, strict=True)
+        ]
+        fps = run.record.fps
+        bridged, bridges = with_limbs_bridged(
+            body, cameras, track.frames, track.poses, named, fps, silhouettes_of
         )
-    words = tuple(change.words for change in changes)
+        corrected, changes = with_sides_right(body, cameras, track.frames, bridged, fps, silhouettes_of)
+    words = (*(bridge.words for bridge in bridges), *(change.words for change in changes))
     if not words:
         drop_track(run, SIDES)
         return ()
@@ -95,21 +104,21 @@ def can_be_looked_at(run: StoredRun) -> bool:
     return not (run.record.live or run.record.ping_pong)
 
 
-def exchanged_sides(run: StoredRun) -> tuple[str, ...]:
-    """The exchanges of the run's track "sides"; none without one or if the run has changed since."""
+def corrections_of(run: StoredRun) -> tuple[str, ...]:
+    """What the run's track "sides" corrects; nothing without one or if the run has changed since."""
     if best_track(run, (SIDES,)).name != SIDES:
         return ()
     return tuple(read_track(run, SIDES).made_by.get(EXCHANGED, ()))
 
 
 def notes_of(run: StoredRun) -> tuple[str, ...]:
-    """The run's notes, with the exchanged sides."""
-    words = exchanged_sides(run)
+    """The run's notes, with the corrections."""
+    words = corrections_of(run)
     return (*run.record.notes, *([in_words(words)] if words else []))
 
 
 def in_words(words: tuple[str, ...]) -> str:
-    return f"Sides were corrected in track '{SIDES}': {'; '.join(words)}. The tracked poses stay in '{RAW}'."
+    return f"Corrected over the whole clip, in track '{SIDES}': {'; '.join(words)}. The tracked poses stay in '{RAW}'."
 
 
 def _look_at(

@@ -1,6 +1,7 @@
 """Subject and background alike in colour: said before anything is tracked, with limbs, cameras and where."""
 
 import dataclasses
+from contextlib import closing
 from pathlib import Path
 
 import cv2
@@ -8,21 +9,33 @@ import numpy as np
 import pytest
 from alike_person import SIZE, make_alike_session, standing_pose
 
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.pipeline import EvidenceMaker
+from studio.runs.drawing.overlay_drawing import projected_silhouette
 from studio.runs.new_run import prepare_run
 from studio.runs.setup.background_setup import set_up_background
 from studio.runs.setup.contrast import Contrast, KnownPoses, ViewContrast, draw_contrast, measure_contrast
 from studio.runs.setup.mask_quality import mask_quality, measure_masks
 from studio.runs.setup.session_settings import session_settings
+from studio.search.likelihood.overlay import limb_contours
 from studio.sessions.background_files import SessionEvidence, write_evidence
 from studio.sessions.session import Session
 
 CAMERAS = ("cam1", "cam2", "cam3", "cam4")
+EACH_ALONE = {"mask_shadow_floor": False}
+"""No camera says what another one takes for shadow."""
+
+
+def make_poorly_seen_session(folder: Path) -> Session:
+    """Forearms are a darker floor, and no camera helps another."""
+    session = make_alike_session(folder, forearms_alike=True)
+    write_evidence(session, SessionEvidence(knobs=EACH_ALONE))
+    return session
 
 
 @pytest.fixture(scope="module")
 def alike(tmp_path_factory: pytest.TempPathFactory) -> Session:
-    """Forearms are a darker floor."""
-    return make_alike_session(tmp_path_factory.mktemp("alike") / "alike", forearms_alike=True)
+    return make_poorly_seen_session(tmp_path_factory.mktemp("alike") / "alike")
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +57,35 @@ def test_limbs_of_a_known_pose_are_named_with_their_cameras(alike: Session) -> N
     assert found.words == "forearms and background are alike in cam1 to cam4"
     assert "source person" in found.remedy
     assert "source best" in found.remedy
+
+
+def test_cameras_that_see_the_floor_empty_bring_the_forearms_back(tmp_path: Path) -> None:
+    session = make_alike_session(tmp_path / "together", forearms_alike=True)
+    assert not contrast_of(session, posed=True).alike
+    body, settings = session.body(), session_settings(session).evidence
+    forearms = [at for at, limb in enumerate(body.drawn) if "forearm" in limb.name]
+    shares: dict[bool, list[float]] = {}
+    for together in (True, False):
+        knobs = dataclasses.replace(settings, mask_shadow_floor=together)
+        with closing(session.footage()) as footage:
+            maker = EvidenceMaker(session.cameras(), footage, Backgrounds(footage), knobs, "none")
+            seen = maker.evidence(0)
+            for view in seen.views:
+                np.testing.assert_array_equal(maker.mask(view.camera, 0), view.mask)
+            for name, _, view in maker.views(CAMERAS[1:], [0], lambda done, total: None):
+                wanted = next(one for one in seen.views if one.camera == name)
+                np.testing.assert_array_equal(view.mask, wanted.mask)
+        contours = limb_contours(body, session.cameras(), standing_pose())
+        shares[together] = [
+            float(
+                (
+                    view.mask[projected_silhouette([own[at] for at in forearms], *view.mask.shape) > 0] > 0
+                ).mean()
+            )
+            for view, own in zip(seen.views, contours, strict=True)
+        ]
+    assert max(shares[False]) < 0.3
+    assert min(shares[True]) > 0.7
 
 
 def test_a_subject_of_another_colour_is_not_named_whatever_its_shadow(apart: Session) -> None:
@@ -90,7 +132,12 @@ def test_masks_that_came_with_the_footage_have_no_contrast(alike: Session) -> No
 
 def test_every_source_is_tried_where_the_views_agree_about_too_little(tmp_path: Path) -> None:
     session = make_alike_session(tmp_path / "tried", forearms_alike=True)
-    shadows = {"mask_shadow_test": True, "mask_shadow_darkest": 0.4, "mask_shadow_colour": 0.025}
+    shadows = {
+        "mask_shadow_test": True,
+        "mask_shadow_darkest": 0.4,
+        "mask_shadow_colour": 0.025,
+        **EACH_ALONE,
+    }
     made = set_up_background(session, "plate", knobs=shadows)
     assert made.choice is not None
     assert any("every source was tried besides plate" in note for note in made.notes)
@@ -99,7 +146,7 @@ def test_every_source_is_tried_where_the_views_agree_about_too_little(tmp_path: 
 
 
 def test_the_first_run_notes_it(tmp_path: Path) -> None:
-    session = make_alike_session(tmp_path / "noted", forearms_alike=True)
+    session = make_poorly_seen_session(tmp_path / "noted")
     run = prepare_run(session, start_pose=standing_pose(), fit_shape=False)
     assert [note for note in run.record.notes if note.startswith("Forearms and background are alike")]
     second = prepare_run(session, start_pose=standing_pose(), fit_shape=False)
@@ -107,7 +154,7 @@ def test_the_first_run_notes_it(tmp_path: Path) -> None:
 
 
 def test_it_is_remembered_for_the_guided_set_up(alike: Session) -> None:
-    write_evidence(alike, SessionEvidence())
+    write_evidence(alike, SessionEvidence(knobs=EACH_ALONE))
     assert not measure_masks(alike).usable
 
 

@@ -15,7 +15,7 @@ from studio.operations.jobs.open_run import OpenRun
 from studio.operations.jobs.tracking_job import SideLooking
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refining import smooth_run
-from studio.runs.sides import notes_of, put_sides_right
+from studio.runs.sides import correct_clip, notes_of
 from studio.runs.tracks import best_track, read_track, track_names
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -50,7 +50,7 @@ def test_legs_are_corrected_once_and_the_raw_track_stays(
 ) -> None:
     raw, read = read_track(run), list[int]()
     assert notes_of(run) == run.record.notes
-    words = put_sides_right(run, problems, read.append)
+    words = correct_clip(run, problems, read.append)
     assert words == WORDS
     assert np.array_equal(read_track(run).poses, raw.poses)
     track, body = read_track(run, "best"), run.body()
@@ -62,9 +62,11 @@ def test_legs_are_corrected_once_and_the_raw_track_stays(
     kept = np.setdiff1d(np.arange(LAST), EXCHANGED)
     assert np.array_equal(track.poses[kept], raw.poses[kept])
     assert (track.confidence[list(EXCHANGED)] > 0.7).all()
-    assert notes_of(run)[-1].startswith("Sides were corrected in track 'sides': frames 12 to 27: left")
+    assert notes_of(run)[-1].startswith(
+        "Corrected over the whole clip, in track 'sides': frames 12 to 27: left"
+    )
     looked = len(read)
-    assert put_sides_right(run, problems, read.append) == words
+    assert correct_clip(run, problems, read.append) == words
     assert len(read) == looked
     assert smooth_run(run).track.made_by["from"] == "sides"
 
@@ -74,14 +76,14 @@ def test_a_run_that_is_sound_has_no_such_track(
     session: Session, run: StoredRun, truth: np.ndarray, problems: ProblemSource
 ) -> None:
     other = stored(session, truth)
-    assert put_sides_right(other, problems) == ()
+    assert correct_clip(other, problems) == ()
     assert track_names(other) == ("raw",)
     # The same run, tracked again and better: what was made of it before is dropped.
-    put_sides_right(run, problems)
+    correct_clip(run, problems)
     again = stored(session, truth, run)
     assert best_track(again, ("sides",)).outdated == ("sides",)
     assert notes_of(again) == again.record.notes
-    assert put_sides_right(again, problems) == ()
+    assert correct_clip(again, problems) == ()
     assert "sides" not in track_names(again)
 
 

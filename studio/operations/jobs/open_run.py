@@ -19,7 +19,7 @@ from studio.runs.moved_knobs import keep_moved, moved_between, with_moved
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.run_footage import footage_of
-from studio.runs.sides import in_words, put_sides_right
+from studio.runs.sides import correct_clip, in_words
 from studio.runs.tracking_run import Stepped, TrackingRun
 from studio.search.settings import RunSettings, all_knobs, changed_settings, values
 from studio.sessions.run_log import append_to_log
@@ -148,9 +148,9 @@ class OpenRun:
         """
         began = time.perf_counter()
         try:
-            words = put_sides_right(self.stored, self._problems, read)
+            words = correct_clip(self.stored, self._problems, read)
         except StudioError as error:
-            return f"Left and right were not looked at again: {error}"
+            return f"The clip was not looked at again as a whole: {error}"
         finally:
             self.tracking.keep_time(time.perf_counter() - began)
         return in_words(words) if words else ""

@@ -23,7 +23,7 @@ from studio.operations.jobs.open_run import OpenRun
 from studio.operations.jobs.reporter import Place, Reporter, names_of, unforeseen
 from studio.operations.jobs.search_pace import SearchPace
 from studio.runs.problem_source import ProblemSource
-from studio.runs.sides import can_be_looked_at, in_words, put_sides_right
+from studio.runs.sides import can_be_looked_at, correct_clip, in_words
 
 Say = Callable[[OpenRun, str, str], None]
 """A line for a run's log: the run, level, text."""
@@ -50,11 +50,11 @@ class SideLooking:
     def _look(self, run: OpenRun) -> None:
         try:
             with closing(ProblemSource(run.session, run.stored.body(), run.stored.cameras())) as problems:
-                words = put_sides_right(run.stored, problems, self._go_on)
+                words = correct_clip(run.stored, problems, self._go_on)
         except WorkCancelledError:
             return
         except StudioError as error:
-            self._say(run, "error", f"Left and right were not looked at again: {error}")
+            self._say(run, "error", f"The clip was not looked at again as a whole: {error}")
         except Exception:
             if not run.stored.folder.is_dir():  # moved or deleted meanwhile
                 return
@@ -66,7 +66,7 @@ class SideLooking:
     def _go_on(self, _frame: int) -> None:
         if self._ended.is_set():
             raise WorkCancelledError(
-                "Looking at left and right was given up.", "'studio refine' does it, too."
+                "Looking at the clip as a whole was given up.", "'studio refine' does it, too."
             )
 
 

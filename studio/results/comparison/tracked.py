@@ -35,6 +35,7 @@ from studio.search.likelihood.hard_priors import HardPriors
 from studio.search.settings import RunSettings, changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_refinement import FrameRefiner
+from studio.search.trackers.limb_bridging import with_limbs_bridged
 from studio.search.trackers.refinement import Distances
 from studio.search.trackers.side_exchange import with_sides_right
 from studio.search.trackers.tracker import LayerRecord, start_of
@@ -200,7 +201,9 @@ def track_seeds(
                 row = frames.index(frame)
                 return known_silhouettes(body, seen_with, evidence(frame), poses[row], run.memories[row])
 
-            poses = with_sides_right(body, seen_with, np.array(frames), poses, rate, silhouettes_of)[0]
+            rows = np.array(frames)
+            poses = with_limbs_bridged(body, seen_with, rows, poses, lost, rate, silhouettes_of)[0]
+            poses = with_sides_right(body, seen_with, rows, poses, rate, silhouettes_of)[0]
         figures = measured(session, body, poses, np.array(frames), evaluations, seconds / len(runs))
         by_frame = dict(zip(frames, lost, strict=True))
         impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())

@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, get_args
 
 import msgspec
@@ -23,8 +24,8 @@ import msgspec
 from studio.body.scale import scale_of
 from studio.evidence.backgrounds import FEWEST_FRAMES, Backgrounds
 from studio.evidence.frame_evidence import ViewEvidence
-from studio.evidence.masks import PackedMask, reduced, uncleaned
-from studio.evidence.pipeline import EvidenceMaker, RawMask
+from studio.evidence.masks import reduced, uncleaned
+from studio.evidence.pipeline import EvidenceMaker, PackedRaw
 from studio.evidence.settings import EvidenceSettings
 from studio.evidence.strokes import Stroke
 from studio.evidence.volume.reconstruction import MOST_VIEWS, check_views
@@ -477,11 +478,8 @@ def _views_of(
     """Pictures and the masks that the session makes of them, of some cameras and frames."""
     chosen = list(frames)
     with masks_of(session) as maker:
-        for done, name in enumerate(cameras):
-            for at, frame in enumerate(chosen):
-                progress("writing the masks", done * len(chosen) + at, len(cameras) * len(chosen))
-                yield frame, maker.view(name, frame)
-            maker.release(name)
+        for _, frame, view in maker.views(cameras, chosen, partial(progress, "writing the masks")):
+            yield frame, view
 
 
 def frames_in_words(frames: Sequence[int]) -> str:
@@ -560,7 +558,7 @@ class _Trying:
         self.frames = spread_frames(footage.frame_count, TRIED_FRAMES)
         self._session, self._footage, self._cameras, self._report = session, footage, cameras, report
         self._backgrounds = Backgrounds(footage)
-        self._raw: dict[EvidenceSettings, dict[tuple[int, str], tuple[PackedMask, bool]]] = {}
+        self._raw: dict[EvidenceSettings, dict[tuple[int, str], PackedRaw]] = {}
         self._tried, self._total = 0, total
 
     def look(self, trials: Sequence[Mapping[str, Knob]]) -> None:
@@ -573,8 +571,9 @@ class _Trying:
                 self._report("trying knobs", 0, self._total)
                 picture = self._footage.picture(camera.name, frame)
                 for key, maker in makers.items():
-                    raw = maker.raw_mask(camera.name, frame, picture)
-                    self._raw[key][frame, camera.name] = PackedMask(raw.mask), raw.to_clean
+                    self._raw[key][frame, camera.name] = PackedRaw(
+                        maker.raw_mask(camera.name, frame, picture)
+                    )
             self._footage.release(camera.name)
             self._backgrounds.release(camera.name)
 
@@ -585,12 +584,13 @@ class _Trying:
         settings = _settings(self._session, knobs)
         maker, raw = self._maker(settings), self._raw[uncleaned(settings)]
         for frame in self.frames:
-            masks: list[Bytes] = []
-            for camera, lens in zip(self._cameras, small, strict=True):
-                packed, to_clean = raw[frame, camera.name]
-                mask = maker.finished_mask(camera.name, RawMask(packed.unpacked(), to_clean))
-                masks.append(reduced(mask, lens))
-            yield masks
+            seen = maker.without_false_shadows(
+                {camera.name: raw[frame, camera.name].unpacked() for camera in self._cameras}
+            )
+            yield [
+                reduced(maker.finished_mask(camera.name, seen[camera.name]), lens)
+                for camera, lens in zip(self._cameras, small, strict=True)
+            ]
 
     def _maker(self, settings: EvidenceSettings) -> EvidenceMaker:
         return EvidenceMaker(self._cameras, self._footage, self._backgrounds, settings, "none")

@@ -31,7 +31,7 @@ from studio.body.model import BodyModel
 from studio.body.scale import scale_of
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.masks import PackedMask, reduced
-from studio.evidence.pipeline import EvidenceMaker
+from studio.evidence.pipeline import EvidenceMaker, PackedRaw
 from studio.evidence.settings import EvidenceSettings
 from studio.evidence.volume.hull import Hull
 from studio.evidence.volume.hull_pieces import chosen_voxels
@@ -286,16 +286,23 @@ class _Masks:
         makers = {
             kind: EvidenceMaker(cameras, footage, backgrounds, one, "none") for kind, one in kinds.items()
         }
-        self._masks: dict[tuple[str, int, int], PackedMask] = {}
-        for number, (camera, lens) in enumerate(zip(cameras, self.lenses, strict=True)):
+        raw: dict[tuple[str, int, str], PackedRaw] = {}
+        for number, camera in enumerate(cameras):
             for done, frame in enumerate(self.frames):
                 progress("measuring the contrast", number * len(frames) + done, len(cameras) * len(frames))
                 picture = footage.picture(camera.name, frame)
                 for kind, maker in makers.items():
-                    mask = maker.finished_mask(camera.name, maker.raw_mask(camera.name, frame, picture))
-                    self._masks[kind, number, frame] = PackedMask(reduced(mask, lens))
+                    raw[kind, frame, camera.name] = PackedRaw(maker.raw_mask(camera.name, frame, picture))
             footage.release(camera.name)
             backgrounds.release(camera.name)
+        self._masks: dict[tuple[str, int, int], PackedMask] = {}
+        for kind, maker in makers.items():
+            for frame in self.frames:
+                seen = {camera.name: raw.pop((kind, frame, camera.name)).unpacked() for camera in cameras}
+                seen = maker.without_false_shadows(seen)
+                for number, (camera, lens) in enumerate(zip(cameras, self.lenses, strict=True)):
+                    mask = maker.finished_mask(camera.name, seen[camera.name])
+                    self._masks[kind, number, frame] = PackedMask(reduced(mask, lens))
 
     def of(self, kind: str, view: int, frame: int) -> Bytes:
         """(h, w) 0 or 255."""

@@ -241,11 +241,14 @@ def _each_view(
     maker: EvidenceMaker, cameras: tuple[Camera, ...], frames: Sequence[int], total: int, progress: Progress
 ) -> Iterator[tuple[Camera, int, ViewEvidence]]:
     """Picture and mask of every camera and frame, camera by camera: only one camera's pictures are held."""
-    for done, camera in enumerate(cameras):
-        for number, frame in enumerate(frames):
-            progress("comparing masks", done * len(frames) + number, total)
-            yield camera, frame, maker.view(camera.name, frame)
-        maker.release(camera.name)
+    by_name = {camera.name: camera for camera in cameras}
+
+    def looked(done: int, pictures: int) -> None:
+        # The masks are compared afterwards, which makes up the rest of `total`.
+        progress("comparing masks", len(cameras) * len(frames) * done // pictures, total)
+
+    for name, frame, view in maker.views(tuple(by_name), frames, looked):
+        yield by_name[name], frame, view
 
 
 def measure_masks(

@@ -86,8 +86,7 @@ class WholeMasks:
     def of(self, camera: str, frame: int) -> Bytes:
         """(H, W) 0 or 255. Raises FootageError."""
         if not self._cut:
-            raw = self.maker.raw_mask(camera, frame, self.footage.picture(camera, frame))
-            return self.maker.finished_mask(camera, raw)
+            return self.maker.mask(camera, frame)
         source = next(one for one in self._session.manifest.footage.cameras if one.name == camera)
         folder = self._session.path / source.masks
         path = folder.parent / WHOLE / folder.name / mask_name(source, frame)

@@ -223,7 +223,7 @@ def redrawn(
             break
         limb = max(doubtful, key=lambda name: shares[name])
         tried.add(limb)
-        own = _bent_by(frame.refiner, limb)
+        own = bent_by(frame.refiner, limb)
         if len(own) > 1:
             drawn = _drawn(rng, frame.refiner, found.pose[None], own)
             found = frame.best_of(found, drawn, own)
@@ -246,7 +246,7 @@ def _both_redrawn(
     refiner, agreement = frame.refiner, frame.agreement
     names = list(found.off.shares())
     twin = names[int(name_twins(names)[names.index(limb)])]
-    own, others = _bent_by(refiner, limb), _bent_by(refiner, twin)
+    own, others = bent_by(refiner, limb), bent_by(refiner, twin)
     if twin == limb or len(own) < 2 or len(others) < 2:
         return found, 0
     places = _drawn(rng, refiner, found.pose[None], own)
@@ -255,7 +255,7 @@ def _both_redrawn(
     return frame.best_of(found, pairs, [*own, *others]), len(places) + len(pairs)
 
 
-def _bent_by(refiner: Refiner, limb: str) -> list[int]:
+def bent_by(refiner: Refiner, limb: str) -> list[int]:
     """The angles with limits that bend a limb."""
     return [n for n, entry in enumerate(refiner.body.parameters) if entry.limb == limb and refiner.bounded[n]]
 

@@ -222,7 +222,7 @@ class _Work:
         """Rows that are always examined."""
         step = max(1, round((BODY_GRID_S if kind.whole else GRID_S) * self._fps))
         ends = self._ends(kind, self.poses)
-        jumped = _moved(ends[1:], ends[:-1]) > JUMP * self._usual(ends)
+        jumped = moved(ends[1:], ends[:-1]) > JUMP * self._usual(ends)
         jumps = np.flatnonzero(jumped).tolist()
         return sorted({*range(0, len(ends), step), len(ends) - 1, *jumps, *(row + 1 for row in jumps)})
 
@@ -276,7 +276,7 @@ class _Work:
         before, after = self._ends(kind, np.stack([self.poses[row], pose]))[:, None]
         if (
             loss < NOTABLY * examined.losses[row]
-            and _moved(after, examined.wanted[row]) < _moved(after, before) + NEAR_MM
+            and moved(after, examined.wanted[row]) < moved(after, before) + NEAR_MM
         ):
             examined.losses[row], examined.poses[row] = loss, pose
 
@@ -306,8 +306,8 @@ class _Work:
 
     def _usual(self, ends: Array) -> float:
         """σ, the usual movement, mm a frame."""
-        moved = _moved(ends[1:], ends[:-1])
-        return max(float(np.median(moved)) if len(moved) else 0.0, STILL_MM_S / self._fps)
+        distances = moved(ends[1:], ends[:-1])
+        return max(float(np.median(distances)) if len(distances) else 0.0, STILL_MM_S / self._fps)
 
     def _movements(self, kind: Kind) -> Array:
         """(K - 1, 2, 2) cost of moving from tracked, exchanged (before) to tracked, exchanged (after)."""
@@ -318,8 +318,8 @@ class _Work:
         usual = self._usual(both[0]) * np.diff(self.frames)
         for before in (0, 1):
             for after in (0, 1):
-                moved = _moved(both[after][1:], both[before][:-1])
-                costs[:, before, after] = MOTION * np.log1p((moved / usual) ** 2)
+                distances = moved(both[after][1:], both[before][:-1])
+                costs[:, before, after] = MOTION * np.log1p((distances / usual) ** 2)
         return costs
 
     def _backwards(self) -> Array:
@@ -383,6 +383,6 @@ def best_path(gains: Array, movements: Array) -> tuple[NDArray[np.bool_], float]
     return found, gained
 
 
-def _moved(after: Array, before: Array) -> Array:
+def moved(after: Array, before: Array) -> Array:
     """(K,) root mean square distance of points (K, P, 3)."""
     return np.sqrt(np.square(after - before).sum(axis=2).mean(axis=1))
