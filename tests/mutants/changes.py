@@ -30,7 +30,7 @@ COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
 }
 NAMES = {"min": "max", "max": "min", "any": "all", "all": "any", "minimum": "maximum", "maximum": "minimum"}
 DECLARING = ("knob", "Knob", "ParamSpec", "TypeVar", "njit", "slice_of", "Field")
-"""Calls whose numbers are choices, not computation."""
+"""Calls (by the ends of their names) whose numbers are choices, not computation."""
 NOTES = ("progress", "report", "warn", "info", "debug", "warning")
 """Calls that tell somebody something: that one is missing changes no result."""
 
@@ -81,7 +81,7 @@ def _forms(node: ast.AST) -> Iterator[tuple[ast.AST, str]]:
     """Below a node, each part that can be changed and the source of what it becomes."""
     if isinstance(node, ast.Import | ast.ImportFrom | ast.Raise | ast.Assert | ast.JoinedStr):
         return
-    if isinstance(node, ast.Call) and _called(node) in DECLARING:
+    if isinstance(node, ast.Call) and _called(node).endswith(DECLARING):
         return
     if isinstance(node, ast.keyword) and node.arg == "strict":
         return  # of zips whose sides are as long

@@ -73,6 +73,14 @@ def test_motion_is_smooth_and_near_the_training(model: BehaviourModel) -> None:
     assert speeds.max() < 1.5 * usual.max()
 
 
+def test_a_path_begins_in_the_chosen_state_with_its_label(model: BehaviourModel) -> None:
+    labels = model.automaton.last_symbols
+    assert set(labels) == {-1, *range(model.clusters)}
+    for state in np.flatnonzero(labels >= 0):
+        begun = walk(np.random.default_rng(0), model.automaton, 1, start=int(state))
+        assert (begun.states[0], begun.labels[0]) == (state, labels[state])
+
+
 def test_a_chosen_start_and_seeds(model: BehaviourModel) -> None:
     runs = [generate(np.random.default_rng(seed), model, 80, start=3) for seed in (7, 7, 8)]
     assert all(states[0] == 3 for _, states in runs)
