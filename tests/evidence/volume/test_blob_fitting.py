@@ -221,6 +221,13 @@ def test_voxels_no_view_coloured_and_no_voxels_at_all(
     unseen[::2] = np.nan
     half = Hull(hull.centres, hull.edges, unseen, hull.view_colours, 7, hull.box)
     assert np.isfinite(fit_blobs(half, learnt, body, pose[None]).log_likelihood)
+    voxels, known = Voxels.of(half), unseen[1::2].astype(float)
+    shares = hull.weights()[1::2] / hull.weights()[1::2].sum()
+    np.testing.assert_allclose(voxels.colour, shares @ known, rtol=1e-6)
+    np.testing.assert_allclose(
+        voxels.rows[3:, ::2], np.tile(voxels.colour[:, None], (1, len(unseen[::2]))), rtol=1e-6
+    )
+    np.testing.assert_allclose(voxels.colour_variance, shares @ (known - voxels.colour) ** 2, rtol=1e-6)
     nothing = Hull(hull.centres, hull.edges, np.full_like(unseen, np.nan), hull.view_colours, 7, hull.box)
     assert np.isfinite(fit_blobs(nothing, learnt, body, pose[None]).log_likelihood)
     with pytest.raises(ValueError, match="empty hull"):

@@ -1,5 +1,6 @@
 """Classification of voxels by pixels and masks: against plain NumPy and Eq. 6 written out."""
 
+import itertools
 import math
 from typing import Any
 
@@ -200,13 +201,18 @@ def test_summed_areas_count_mask_pixels() -> None:
 
 
 def test_a_mask_carves_only_what_covers_none_of_its_pixels() -> None:
+    """On each side of the rectangle its last pixel counts and the next does not."""
     rows = placed(60.0)
-    u, v = (int(np.floor(rows[k, 0] + 0.5)) for k in (projection.U, projection.V))
-    reach, place = rows[projection.BOUND_X, 0], rows.reshape(-1)
-    for offset, expected in ((0.8 * reach, kernels.EDGE), (1.3 * reach + 1, kernels.BACKGROUND)):
-        mask, sums = np.zeros((240, 320), np.uint8), np.empty(321 * 241, np.int32)
-        mask[v, int(u + offset)] = 255
-        summed_areas(mask, sums)
-        assert kernels.look_at_mask(sights()._replace(sums=sums), 0, rules(), place, 0) == expected
+    place, sums = rows.reshape(-1), np.empty(321 * 241, np.int32)
+    middle = rows[[projection.U, projection.V], 0]
+    reach = rows[[projection.BOUND_X, projection.BOUND_Y], 0]
+    for axis, way in itertools.product((0, 1), (-1, 1)):
+        for beyond, expected in ((0, kernels.EDGE), (way, kernels.BACKGROUND)):
+            pixel = np.floor(middle + 0.5).astype(int)
+            pixel[axis] = int(np.floor(middle[axis] + way * reach[axis] + 0.5)) + beyond
+            mask = np.zeros((240, 320), np.uint8)
+            mask[pixel[1], pixel[0]] = 255
+            summed_areas(mask, sums)
+            assert kernels.look_at_mask(sights()._replace(sums=sums), 0, rules(), place, 0) == expected
     summed_areas(np.full((240, 320), 255, np.uint8), sums)
     assert kernels.look_at_mask(sights()._replace(sums=sums), 0, rules(), place, 0) == kernels.FOREGROUND
