@@ -2,8 +2,8 @@
 
 The commit before the first move is checked out beside this one. Both track the same few frames with every tracker and
 likelihood, export one of the runs in every format, print every command's help and describe their API. What differs is
-printed. `as_before.json` keeps the hashes of the state before, and how the names begin of what changed on purpose, with
-the reason.
+printed. `as_before.json` keeps the hashes of the state before, with the processor that made them, and how the names
+begin of what changed on purpose, with the reason.
 """
 
 import argparse
@@ -18,6 +18,7 @@ import tempfile
 from pathlib import Path
 
 from click.testing import CliRunner
+from llvmlite.binding import get_host_cpu_name
 
 import studio
 
@@ -54,9 +55,18 @@ def main() -> int:
                 before = _collected_by(checkout, Path(folder) / "before.json")
             finally:
                 subprocess.run(["git", "worktree", "remove", "--force", str(checkout)], cwd=ROOT, check=True)
-            kept = {"commit": BEFORE, "hashes": before, "changed": kept["changed"]}
+            kept = {
+                "commit": BEFORE,
+                "processor": get_host_cpu_name(),
+                "hashes": before,
+                "changed": kept["changed"],
+            }
             KEPT.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n")
         now = _collected_by(ROOT, Path(folder) / "now.json")
+    if kept["processor"] != get_host_cpu_name():
+        print(
+            f"Kept on another processor ({kept['processor']}), where last digits differ: --keep makes it again."
+        )
     before, noted = kept["hashes"], kept["changed"]
     differing = sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
     unexplained = [name for name in differing if not name.startswith(tuple(noted))]
