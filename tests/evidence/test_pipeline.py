@@ -106,6 +106,16 @@ def test_threads_and_order_change_nothing(footage: Footage) -> None:
                     np.testing.assert_array_equal(view.edges, other.edges)
 
 
+def test_with_a_plate_little_of_the_combined_background_is_doubtful_and_without_one_all(
+    footage: Footage,
+) -> None:
+    backgrounds = Backgrounds(footage)
+    assert backgrounds.combined("bare")[1].all()
+    model, doubtful = backgrounds.combined("plate")
+    assert doubtful.mean() < 0.02
+    assert np.abs(model.mean - room()).mean() < 2.0
+
+
 def test_models_are_fitted_once(footage: Footage) -> None:
     backgrounds = Backgrounds(footage)
     assert backgrounds.model("plate", "gaussian") is backgrounds.model("plate", "gaussian")
