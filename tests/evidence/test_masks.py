@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 import pytest
 from scipy import ndimage
+from toy_footage import looking_at
 
-from studio.evidence.masks import cleaned
+from studio.evidence.masks import cleaned, reduced
 from studio.evidence.settings import EvidenceSettings
 
 OFF = dataclasses.replace(
@@ -20,6 +21,15 @@ def blobs(seed: int) -> np.ndarray:
     """Random pieces with holes and pieces inside holes."""
     field = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=(120, 160)), 3.0)
     return np.where(field > 0.02, np.uint8(255), np.uint8(0))
+
+
+def test_a_pixel_of_a_reduced_mask_is_foreground_where_half_of_its_area_was() -> None:
+    mask = blobs(1)
+    camera = looking_at("whole", (3000.0, 0.0, 1500.0), (0.0, 0.0, 1000.0)).resized(160, 120)
+    assert reduced(mask, camera) is mask
+    half = reduced(mask, camera.resized(80, 60))
+    share = (mask > 0).reshape(60, 2, 80, 2).mean(axis=(1, 3))
+    np.testing.assert_array_equal(half, np.where(share >= 0.5, 255, 0))
 
 
 def test_nothing_on_changes_nothing() -> None:

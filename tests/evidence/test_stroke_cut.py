@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studio.evidence.stroke_cut import BINS, StrokeCut, _cells
+from studio.evidence.stroke_cut import BINS, NEARNESS, StrokeCut, _cells, _nearness
 from studio.evidence.strokes import Stroke
 from studio.foundations.errors import FootageError
 
@@ -65,6 +65,16 @@ def test_colours_fall_into_bins_of_luma_and_of_both_differences_of_colour() -> N
     assert luma.tolist() == [25, 9, 18, 3, 28]
     assert red.tolist() == [middle, most, 0, 10, 21]
     assert blue.tolist() == [middle, 5, 0, most, 0]
+
+
+def test_a_place_is_likelier_inside_the_nearer_it_is_to_a_stroke_inside_than_to_one_outside() -> None:
+    marks = np.zeros((41, 41), np.uint8)
+    marks[20, 10], marks[20, 30] = 1, 2
+    odds = _nearness(marks)
+    assert (odds[20, 10], odds[20, 30]) == pytest.approx((NEARNESS, -NEARNESS))
+    assert odds[20, 20] == pytest.approx(0.0, abs=1e-6)
+    # The picture's border is outside.
+    assert np.allclose(odds[0], -NEARNESS)
 
 
 def test_without_a_stroke_inside_nothing_is_cut() -> None:
