@@ -5,8 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 from posed_cones import ring
+from toy_footage import looking_at
 
-from studio.evidence.volume.tracking_space import Box, box_of
+from studio.evidence.volume.tracking_space import Box, _surroundings, box_of
 from studio.foundations.errors import CalibrationError
 from studio.foundations.geometry.sight import sees
 
@@ -29,6 +30,16 @@ def test_the_box_stands_on_the_floor_in_the_common_view() -> None:
     ):
         places = np.array([[*outside, z] for z in (300.0, 1000.0, 1700.0)])
         assert not all(sees(camera, places).all() for camera in cameras)
+
+
+def test_the_search_is_around_where_the_cameras_look_or_in_their_middle_where_they_look_one_way() -> None:
+    places = ((3000.0, 0.0, 1500.0), (2500.0, 2000.0, 1800.0), (2800.0, -1500.0, 1200.0))
+    watching = [looking_at("a", place, (-500.0, 300.0, 900.0)) for place in places]
+    middle, radius = _surroundings(watching, 900.0, 1.0)
+    np.testing.assert_allclose(middle, (-500.0, 300.0), atol=10.0)
+    assert radius == pytest.approx(1.2 * max(np.hypot(x + 500.0, y - 300.0) for x, y, _ in places), rel=0.01)
+    beside = [looking_at("a", (0.0, y, 900.0), (1000.0, y, 900.0)) for y in (-600.0, 0.0, 1200.0)]
+    np.testing.assert_allclose(_surroundings(beside, 900.0, 1.0)[0], (0.0, 200.0), atol=1.0)
 
 
 def test_the_cube_stands_on_the_middle_of_the_floor() -> None:
