@@ -162,7 +162,10 @@ def test_names_of_the_other_side() -> None:
         "Haunch_left": "Haunch_right",
         "Left toe": "Right toe",
         "L_toe": "R_toe",
+        "left hand, left side": "right hand, left side",
     }
     assert {name: other_side(name, "left") for name in known} == known
+    twice = known.pop("left hand, left side")
+    assert other_side(twice, "right") == "left hand, left side"
     assert {other: other_side(other, "right") for other in known.values()} == {b: a for a, b in known.items()}
     assert [other_side(name, "left") for name in ("Loin", "Tail_0", "Nose", "Ear_R")] == [""] * 4

@@ -76,6 +76,14 @@ def test_arms_without_a_root_are_exchanged() -> None:
     assert abs(gap) < 1e-6
 
 
+def test_what_no_limb_determines_stays_as_it_was() -> None:
+    body = load_body("human29")
+    pose, free = some_pose(body), np.flatnonzero(body.bounded_angles)
+    fitted, rest = Mirror(body)._fit(pose, np.zeros((0, 2, 3)), free, limbs=np.zeros(0, np.int64))
+    np.testing.assert_allclose(fitted, pose, atol=1e-6)
+    assert rest == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_body_without_sides_has_no_mirror() -> None:
     with pytest.raises(BodyError, match="no left and right"):
         Mirror(load_body("planar_arm4"))

@@ -16,7 +16,7 @@ from studio.body.catalogue import body_file_text, list_bodies, load_body
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.model import BodyModel
 from studio.body.reader import parse_body
-from studio.body.robots import THIN, fitted_cone
+from studio.body.robots import THIN, _rotation, fitted_cone
 from studio.foundations.errors import BodyError
 
 ARM = Path(studio.results.drawing_footage.__file__).parent / "recipe_files" / "robot_arm.urdf"
@@ -256,6 +256,11 @@ def test_shapes_have_the_sizes_of_the_geometry(tmp_path: Path) -> None:
     assert volume(limbs["trunk"]) == pytest.approx(4.0 / 3.0 * np.pi * 100.0 * 300.0 * 200.0, rel=1e-4)
     assert limbs["arm"].length == pytest.approx(400.0)
     assert volume(limbs["arm"]) == pytest.approx(40.0 * 400.0 * 60.0, rel=1e-4)
+
+
+def test_a_quaternion_is_the_rotation_that_it_means() -> None:
+    for w, x, y, z in np.random.default_rng(0).normal(size=(5, 4)):
+        np.testing.assert_allclose(_rotation([w, x, y, z]), Rotation.from_quat([x, y, z, w]).as_matrix())
 
 
 def test_a_meshs_cone_is_that_of_a_cone() -> None:

@@ -71,7 +71,7 @@ def test_a_marker_with_three_blank_cells_is_missing(tmp_path: Path) -> None:
         (ROWS.replace("2.5", "inf"), "column 4 (Hip Y)"),
         (ROWS.replace("5.5", "five"), "column 7 (Neck Y) is 'five'"),
         (ROWS.replace("0.0166667", ""), "column 2 (Time)"),
-        (ROWS.replace("2.5", ""), "only part of marker Hip"),
+        *((ROWS.replace(f"\t{cell}\t", "\t\t"), "only part of marker Hip") for cell in ("1.5", "2.5", "3.5")),
         (ROWS.replace("\t6.5", ""), "line 8 has 7 columns, not 8"),
         (ROWS.replace("0.0166667", "0.0"), "does not rise"),
         (ROWS.splitlines()[0], "has 1 rows and its header says 2"),
