@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studio.evidence.colour_fit import colour_line, fitted_line
-from studio.evidence.combined_background import agreeing_frames, combine
+from studio.evidence.combined_background import AGREES, agreeing_frames, background_nearby, combine
 
 HEIGHT, WIDTH, COUNT = 160, 240, 24
 
@@ -65,6 +65,15 @@ def test_a_line_through_most_pixels_is_found() -> None:
     gains, offsets = colour_line(x, y)
     assert gains == pytest.approx(1.15, abs=0.02)
     assert offsets == pytest.approx(7.0, abs=2.0)
+
+
+def test_no_background_is_nearby_where_one_channel_is_another() -> None:
+    empty = room(np.random.default_rng(4)).astype(np.float32)
+    tinted = empty + np.array([0.0, 0.0, 2.0 * AGREES])
+    frames = np.stack([empty, tinted]).astype(np.uint8)
+    shares = background_nearby(frames, empty, np.zeros((HEIGHT, WIDTH), np.uint8))
+    assert (shares[0] == 1.0).all()
+    assert (shares[1] == 0.0).all()
 
 
 def test_a_background_of_one_colour_keeps_its_ratio() -> None:

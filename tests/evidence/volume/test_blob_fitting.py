@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.evidence.volume.blob_fitting import Fitted, Voxels, fit_blobs, nearest_blobs, self_likelihood
-from studio.evidence.volume.blob_kernels import FACTORS, SUMS, assign, count_changes, gather
+from studio.evidence.volume.blob_kernels import FACTORS, SUMS, assign, count_changes, gather, thicken
 from studio.evidence.volume.blob_model import BlobModel, cone_blobs
 from studio.evidence.volume.hull import Hull
 
@@ -212,6 +212,25 @@ def test_large_voxels_count_by_their_volume(body: BodyModel, pose: Array, learnt
     one, other = (fit_blobs(hull, learnt, body, pose[None]) for hull in (fine, mixed))
     np.testing.assert_allclose(other.mixture.weights, one.mixture.weights, atol=0.01)
     assert np.linalg.norm(other.mixture.means - one.mixture.means, axis=1).max() < 12.0
+
+
+def test_blobs_are_at_least_as_thick_in_every_direction() -> None:
+    """One that is, two that are thin in a direction, one that is in two."""
+    upper = (
+        [100, 30, 0, 90, 0, 60],
+        [100, 90, 0, 100, 0, 100],
+        [10, 0, 5, 90, 0, 60],
+        [100, 90, 0, 100, 0, 10],
+    )
+    state = np.zeros((len(upper), 16))
+    state[:, 3:9] = upper
+    before = state.copy()
+    thicken(state, 20.0)
+    places = np.array([[3, 4, 5], [4, 6, 7], [5, 7, 8]])
+    for old, new in zip(before, state, strict=True):
+        values, axes = np.linalg.eigh(old[places])
+        np.testing.assert_allclose(new[places], axes * np.maximum(values, 20.0) @ axes.T, atol=1e-9)
+    np.testing.assert_array_equal(state[0], before[0])
 
 
 def test_voxels_no_view_coloured_and_no_voxels_at_all(
