@@ -18,6 +18,7 @@ from studio.search.trackers.refinement import (
     hidden_angles,
     rigid_limbs,
 )
+from studio.search.trackers.refinement_kernels import MARGIN, look_at_limbs
 
 CAMERAS = ring_of_cameras(4, 480, 360)
 SETTINGS = RefinementSettings()
@@ -147,6 +148,25 @@ def test_refining_twice_gives_the_same(
 ) -> None:
     refiner, start = Refiner(body, CAMERAS, SETTINGS), shaken(body, truth, 2)
     assert np.array_equal(refiner.refine(start, seen).pose, refiner.refine(start, seen).pose)
+
+
+def test_limbs_are_looked_at_with_their_boxes_turns_and_sides() -> None:
+    """Two quadrilaterals, one way round and the other, and one that is not seen."""
+    quad = np.array([[2.0, 1.0], [6.0, 2.0], [7.0, 9.0], [3.0, 8.0]])
+    quads = np.stack([quad, quad[::-1], np.full((4, 2), np.nan)])
+    usable, turns = np.zeros(3, np.bool_), np.zeros(3)
+    sides, boxes = np.zeros((3, 4, 3)), np.zeros((3, 4))
+    look_at_limbs(quads, np.zeros((3, 4, 2, 5)), usable, turns, sides, boxes)
+    assert usable.tolist() == [True, True, False]
+    assert boxes[:2].tolist() == [[2.0, 1.0, 7.0, 9.0]] * 2
+    assert turns[0] == -turns[1]
+    for own, turn, side in zip(quads[:2], turns[:2], sides[:2], strict=True):
+        along = np.roll(own, -1, axis=0) - own
+        np.testing.assert_allclose(side[:, :2], turn * along)
+        np.testing.assert_allclose(side[:, 2], MARGIN * np.linalg.norm(along, axis=1))
+        # Inside is on the left.
+        to_middle = own.mean(axis=0) - own
+        assert (side[:, 0] * to_middle[:, 1] - side[:, 1] * to_middle[:, 0] > 0.0).all()
 
 
 def test_free_ends_are_crown_fingers_and_toes(body: BodyModel) -> None:

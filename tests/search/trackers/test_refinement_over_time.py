@@ -64,6 +64,15 @@ def off(body: BodyModel, poses: Array, truth: Array) -> float:
     return float(np.linalg.norm(apart, axis=2).mean())
 
 
+def test_movement_weighs_by_the_square_of_the_frame_rate_over_the_acceleration(body: BodyModel) -> None:
+    refiner = Refiner(body, CAMERAS, RefinementSettings())
+    usual, gentle, slow = (
+        MovementRefiner(refiner, fps, acceleration)._weight
+        for fps, acceleration in ((30.0, 2.0), (30.0, 1.0), (15.0, 2.0))
+    )
+    assert (gentle / usual, slow / usual) == pytest.approx((4.0, 1.0 / 16.0))
+
+
 def test_frames_refined_together_move_as_one_and_lie_as_near(
     body: BodyModel, movement: Array, seen: list[tuple[SilhouetteDistances, ...]], found_by_a_search: Array
 ) -> None:
