@@ -1,5 +1,6 @@
 """Classification of voxels by pixels and masks: against plain NumPy and Eq. 6 written out."""
 
+import dataclasses
 import itertools
 import math
 from typing import Any
@@ -18,7 +19,8 @@ from studio.evidence.yuv_background import YuvBackground, learn_background
 from studio.foundations.geometry.camera_table import camera_table, picture_limit
 from studio.foundations.geometry.projection import distorted
 
-CAMERA = ring(3)[0]
+BARREL = ring(3)[0]
+CAMERA = dataclasses.replace(BARREL, distortion=np.array([*BARREL.distortion[:4], 0.02]))
 CAMERAS = camera_table([CAMERA], picture_limit)
 STARTS = np.array([[0, 320 * 240], [0, 321 * 241]])
 MIDDLE = np.array([0.0, 0.0, 900.0])
@@ -166,11 +168,12 @@ def test_equation_6() -> None:
 
 
 def test_many_slightly_odd_samples_are_no_background_and_none_is_foreground() -> None:
-    """9 a sample is below T_1 = 11.3, but the sum of many is above T_k: an edge."""
+    """9 a sample is below T_1 = 11.3, but the sum of many is above T_k: an edge. 12 is above both."""
     odd = np.full(320 * 240, 9.0, np.float32)
     assert look(odd, 100.0, rules()) == kernels.EDGE
     assert look(odd, 100.0, rules(last=True)) == kernels.BACKGROUND
     assert look(odd, 2.0, rules()) == kernels.BACKGROUND
+    assert look(odd + 3.0, 100.0, rules(last=True)) == kernels.FOREGROUND
 
 
 @pytest.mark.parametrize("half", [6.0, 25.0, 90.0])

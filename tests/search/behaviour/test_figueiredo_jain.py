@@ -5,11 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from studio.foundations.errors import BehaviourError
 from studio.search.behaviour.figueiredo_jain import Search, fit_mixture, parameters_of
 from studio.search.behaviour.gaussian_mixture import GaussianMixture
+from studio.search.behaviour.mixture_kernels import losses_without
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,19 @@ def plain_em(points: np.ndarray, truth: Truth, steps: int = 100) -> float:
         away = points[:, None] - means
         covariances = np.einsum("nk,nki,nkj->kij", shares, away, away) / counts[:, None, None]
     return float(np.log(joint.sum(axis=1)).sum())
+
+
+def test_what_is_lost_without_a_component_is_exact_where_points_are_all_its_own() -> None:
+    densities = np.random.default_rng(2).normal(size=(3, 6))
+    densities[0, :3] += [8.0, 40.0, 400.0]
+    logs = np.log([0.5, 0.3, 0.2])
+    joint = densities + logs[:, None]
+    wanted = [
+        (logsumexp(joint, axis=0) - logsumexp(np.delete(joint, number, axis=0), axis=0)).sum()
+        + 6 * np.log1p(-np.exp(logs[number]))
+        for number in range(3)
+    ]
+    np.testing.assert_allclose(losses_without(densities, logs, logsumexp(joint, axis=0)), wanted, rtol=1e-9)
 
 
 @pytest.mark.parametrize("make", [separated, overlapping, unequal])

@@ -78,6 +78,10 @@ def test_another_rate_scales_the_derivatives(model: BehaviourModel) -> None:
     np.testing.assert_allclose(
         double.dynamics.covariances[:, :4, 4:], model.dynamics.covariances[:, :4, 4:] / 2.0
     )
+    assert model.at_rate(0.5).steps_per_frame == pytest.approx(FPS / 0.5)
+    for none in (0.0, -25.0, np.inf):
+        with pytest.raises(BehaviourError, match="no frame rate"):
+            model.at_rate(none)
     # A motion seen twice as often has the labels of the motion.
     poses = waves(3, frames=100)
     times = np.arange(199) / 2.0
