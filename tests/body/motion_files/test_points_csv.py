@@ -20,6 +20,14 @@ def written(folder: Path, text: str, name: str = "points.csv") -> Path:
     return path
 
 
+def test_columns_may_stand_in_any_order(tmp_path: Path) -> None:
+    rows = [line.split(",") for line in LONG.splitlines()]
+    turned = "\n".join(",".join([point, *places, frame]) for frame, point, *places in rows) + "\n"
+    motion, other = (read_points(written(tmp_path, text), 30.0) for text in (LONG, turned))
+    assert other.names == motion.names
+    np.testing.assert_array_equal(other.positions, motion.positions)
+
+
 def test_a_row_a_point_with_a_frame_left_out_and_a_point_missing(tmp_path: Path) -> None:
     motion = read_points(written(tmp_path, LONG), 30.0)
     assert motion.names == ("Nose", "Tail")
