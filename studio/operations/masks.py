@@ -112,7 +112,8 @@ def background(
 ) -> BackgroundSetup:
     """Choose where a session's masks come from, what does not count, and (on the command line) see how good they are.
 
-    Sources: a background ("plate", "clip", "median", "combined"); "person" (a network cuts out a person; needs no
+    Sources: a background ("plate", "clip", "median", "combined"); "animal" (an animal before a picture of the empty
+    place: no shadows and reflections, a tail and legs a few pixels wide); "person" (a network cuts out a person; needs no
     picture of the empty room, takes about a twentieth of a second a picture); "strokes" (anything, from a few brush
     strokes in one or more pictures of each camera); "threshold" (by brightness and colour: knobs `mask_darkest`,
     `mask_brightest`, `mask_hue`, `mask_hue_reach`, `mask_saturation`); "masks" (that came with the footage); "best"
@@ -379,6 +380,7 @@ def _possible_sources(session: Session, cameras: Sequence[BackgroundCamera]) -> 
         "masks": all(given_masks_of(session).values()),
         "best": session.is_comparable,
         "subject": session.is_comparable,
+        "animal": session.is_comparable and bool(cameras) and all(one.given == "plate" for one in cameras),
     }
     return tuple(name for name in SOURCES if cameras and needs.get(name, True))
 

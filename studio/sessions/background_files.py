@@ -36,7 +36,8 @@ from studio.sessions.session import Session, redescribe
 from studio.sessions.work_under_way import one_at_a_time
 
 EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
-PERSON_MASKS, STROKE_MASKS, CHOSEN_MASKS, SUBJECT_MASKS = HOMES = (
+ANIMAL_MASKS, PERSON_MASKS, STROKE_MASKS, CHOSEN_MASKS, SUBJECT_MASKS = HOMES = (
+    "animal_masks",
     "person_masks",
     "stroke_masks",
     "chosen_masks",

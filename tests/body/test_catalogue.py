@@ -21,7 +21,7 @@ COUNTS = {
     "planar_arm4": (4, 4),
     "branched_arms6": (6, 6),
     "dog": (29, 17),
-    "mouse": (29, 15),
+    "mouse": (31, 17),
     "hand25": (25, 20),
 }
 HUMANS = ("human31", "human29", "human34", "human35", "human25")

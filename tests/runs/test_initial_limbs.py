@@ -1,5 +1,7 @@
 """Limbs that a start pose has in a wrong place are found on the silhouettes."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
@@ -8,8 +10,12 @@ from moving_bodies import standing
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
+from studio.evidence.distance_maps import silhouette_distances
 from studio.runs.setup.initial_limbs import limbs_put_right
+from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.frame_refinement import SeenFrame, drawn_along, turned_pose
 from studio.search.trackers.loss_detection import Onlooker
+from studio.search.trackers.refinement import RefinementSettings, Refiner
 
 CAMERAS = ring_of_cameras(4, 480, 360)
 
@@ -54,3 +60,50 @@ def test_a_pose_that_fits_is_not_lost(body: BodyModel, stretched: np.ndarray) ->
     assert onlooker.sight(evidence, found).overlap >= onlooker.sight(evidence, stretched).overlap
     for marker in ("RWrist", "LWrist", "LAnkle", "Head"):
         assert off(body, found, stretched, marker) < 40.0
+
+
+SMALL = tuple(
+    dataclasses.replace(camera, translation=camera.translation / 10.0)
+    for camera in ring_of_cameras(3, 640, 480)
+)
+"""Around an animal of a hand's length."""
+
+
+def rearing_mouse(**changed: float) -> np.ndarray:
+    """Reared up, the tail on the floor behind it."""
+    mouse = load_body("mouse")
+    names = [entry.name for entry in mouse.parameters]
+    pose, values = mouse.neutral, {"pitch": -1.2, "pelvis_z": 40.0, "left_haunch_swing": -1.2, **changed}
+    for name, value in {"right_haunch_swing": -1.2, "tail_lift": 1.2, "tail_2_wag": 0.6, **values}.items():
+        pose[names.index(name)] = value
+    return pose
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_tail_of_many_joints_is_drawn_along_what_the_silhouettes_show_of_it(seed: int) -> None:
+    """Of 1024 tails drawn at once the best still lies 6000 mm² or more beside the silhouettes."""
+    mouse, rng = load_body("mouse"), np.random.default_rng(seed)
+    wags = {f"tail_{number}_wag": rng.uniform(-1.0, 1.0) for number in (2, 3, 4)}
+    truth, hidden = rearing_mouse(**wags), rearing_mouse(tail_lift=-0.9, tail_2_lift=-0.7, tail_2_wag=-1.0)
+    refiner, agreement = Refiner(mouse, SMALL, RefinementSettings()), Agreement(mouse, SMALL)
+    silhouettes = silhouette_distances(drawn_evidence(mouse, truth, SMALL))
+    tail = [number for number, entry in enumerate(mouse.parameters) if entry.limb == "tail"]
+    drawn, _ = drawn_along(rng, SeenFrame(refiner, agreement, silhouettes), hidden, tail)
+    off_by = agreement.of_places(drawn, silhouettes)
+    assert off_by.min() < 500.0
+    assert off(mouse, drawn[off_by.argmin()], truth, "TailTip") < 20.0
+    found = limbs_put_right(mouse, SMALL, drawn_evidence(mouse, truth, SMALL), hidden, seed).pose
+    assert off(mouse, found, truth, "TailTip") < 6.0
+
+
+def test_a_mouse_is_turned_about_the_middle_of_its_trunk() -> None:
+    mouse, pose = load_body("mouse"), rearing_mouse(pitch=-0.4, heading=0.7)
+    turned = turned_pose(mouse, pose)
+    assert turned is not None
+    assert ((turned >= mouse.lower) & (turned <= mouse.upper)).all()
+    before, after = marker_points(mouse, np.stack([pose, turned]))
+    np.testing.assert_allclose(after[:, 2], before[:, 2], atol=0.1)
+    # What was ahead is behind.
+    sums = before[:, :2] + after[:, :2]
+    np.testing.assert_allclose(sums, np.broadcast_to(sums[0], sums.shape), atol=0.1)
+    assert turned_pose(load_body("planar_arm4"), load_body("planar_arm4").neutral) is None

@@ -37,6 +37,7 @@ from studio.foundations.errors import FootageError, RunError, SessionError, Stud
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import sentence
+from studio.runs.setup.animal_masks import animal_masks
 from studio.runs.setup.best_source import SampledMasks, SourceChoice, can_be_subject, choose_sources
 from studio.runs.setup.clean_plates import clean_plates
 from studio.runs.setup.contrast import border_support, measure_contrast
@@ -49,6 +50,7 @@ from studio.runs.setup.stroke_masks import check_all_cameras, make_stroke_masks
 from studio.runs.setup.subject_masks import Place, make_subject_masks
 from studio.search.settings import changed_settings
 from studio.sessions.background_files import (
+    ANIMAL_MASKS,
     CHOSEN_MASKS,
     EVIDENCE_NAME,
     PERSON_MASKS,
@@ -72,7 +74,17 @@ from studio.sessions.session import Session, changed_meanwhile, redescribe
 from studio.sessions.stroke_files import read_strokes, restore_strokes, stored_strokes, write_strokes
 
 BackgroundSource = Literal[
-    "plate", "clip", "median", "combined", "person", "strokes", "threshold", "masks", "best", "subject"
+    "plate",
+    "clip",
+    "median",
+    "combined",
+    "animal",
+    "person",
+    "strokes",
+    "threshold",
+    "masks",
+    "best",
+    "subject",
 ]
 SOURCES: tuple[BackgroundSource, ...] = get_args(BackgroundSource)
 
@@ -113,6 +125,15 @@ MASK_SOURCES: dict[BackgroundSource, MaskSource] = {
         lacking="Give a clip for every camera below.",
     ),
     "median": MaskSource("Median", "The median of the footage. Good if the subject moves about.", "median"),
+    "animal": MaskSource(
+        "Animal",
+        "Before a picture of the empty place from each camera: without shadows and reflections in the floor or in "
+        "glass, with a tail and legs a few pixels wide; where the place has the animal's colour, other views decide.",
+        "auto",
+        lacking="Give a picture of the empty place for every camera below, and calibrate the cameras.",
+        home=ANIMAL_MASKS,
+        has_knobs=False,
+    ),
     "person": MaskSource(
         "Person",
         "A network finds the person and cuts him out, frame by frame: no picture of the empty room, and he may stay in "
@@ -304,6 +325,9 @@ def _set_up(
     elif source == "strokes":
         notes += _make_stroke_masks(session, wanted.run, progress)
         session = Session(session.path)
+    elif source == "animal":
+        _make_animal_masks(session, progress)
+        session = Session(session.path)
     elif source == "masks":
         session = use_given_masks(session)
     else:
@@ -341,6 +365,19 @@ def _make_person_masks(session: Session, progress: Progress) -> list[str]:
     return [f"{name}: nobody was seen in {frames_in_words(unseen[name])}." for name in names]
 
 
+def _make_animal_masks(session: Session, progress: Progress) -> None:
+    """Masks of an animal for all frames and cameras, which the session then uses."""
+    session.check_idle()
+    session = use_given_backgrounds(session)
+    cameras, scale = session.cameras(), scale_of(session.body())
+    with closing(session.footage()) as footage, made_masks(session, ANIMAL_MASKS) as made:
+        empty = {camera.name: Backgrounds(footage).empty_room(camera.name) for camera in cameras}
+        pictures = {name: picture for name, picture in empty.items() if picture is not None}
+        for frame, masks in animal_masks(cameras, footage, pictures, scale, progress):
+            for camera, mask in masks.items():
+                made.put(camera, frame, mask)
+
+
 def _make_stroke_masks(session: Session, run: str, progress: Progress) -> list[str]:
     """Masks of the session's strokes for all frames and cameras, which it then uses; notes on what was taken over."""
     session.check_idle()
@@ -370,10 +407,10 @@ def _cut_to_subject(
 
 
 def candidates(session: Session) -> list[BackgroundSource]:
-    """The sources that a session can use, "best" left out."""
+    """The sources that a session can use, "best" left out, and masks of an animal where people are tracked."""
     sources: list[BackgroundSource] = []
     for source in SOURCES:
-        if source in ("best", "subject"):
+        if source in ("best", "subject") or (source == "animal" and scale_of(session.body()) == 1.0):
             continue
         try:
             _check_source(session, source, read_strokes(session))
@@ -657,12 +694,18 @@ def _check_source(session: Session, source: str, strokes: Sequence[Stroke]) -> N
             "Sources are compared by the agreement of two calibrated cameras or more.",
             "Calibrate the cameras, or choose a source yourself.",
         )
+    if source == "animal" and not session.is_comparable:
+        raise FootageError(
+            "Only two calibrated cameras or more can tell an animal from its reflections.",
+            "Calibrate the cameras, or choose another source.",
+        )
     given = _given_paths(session)
     for camera in session.manifest.footage.cameras:
         path = given[camera.name]
-        if source in ("plate", "clip") and not path:
+        if source in ("plate", "clip", "animal") and not path:
             raise FootageError(
-                f"Camera {camera.name} has no {source}.", "Give one with --plates, or choose the median."
+                f"Camera {camera.name} has no {'plate' if source == 'animal' else source}.",
+                "Give one with --plates, or choose the median.",
             )
         if path and source in ("plate", "clip") and is_picture(session.path / path) != (source == "plate"):
             kind = "picture" if source == "clip" else "video"

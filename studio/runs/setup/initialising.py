@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.body.dimensions import with_usual_feet
+from studio.body.dimensions import follows_height, with_usual_feet
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
 from studio.evidence.frame_evidence import FrameEvidence
@@ -36,6 +36,7 @@ from studio.search.behaviour.model_file import read_model
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.edge_region import CPU
 from studio.search.settings import DEFAULT_TRACKER, RunSettings, changed_settings
+from studio.search.trackers.frame_refinement import Hypothesis
 from studio.search.trackers.initialisation import (
     PER_FAMILY,
     THOROUGH,
@@ -60,6 +61,12 @@ WEIGHTING = "edge-silhouette"
 average, and with samples of the region beside them 19, at 48 mm; on the balancing man, whose room is full of edges,
 those put an arm in front of the chest.
 """
+SILHOUETTES, BY_SILHOUETTES = (
+    "edge-region-silhouette",
+    {"edge_weight": 0.0, "region_weight": 0.0, "silhouette_weight": 5.0},
+)
+"""The likelihood of bodies that are not people's: areas alone. The edges of a tail two pixels wide are worth less than
+no edges, so that with them a mouse whose tail is inside it, and which then faces the other way, weighs more."""
 HULL_DEPTH = 6
 FEWEST_VIEWS = 2
 TURNED = "By the silhouettes the person would face the other way; the pictures say this one."
@@ -127,7 +134,12 @@ def initialise(
     Raises RunError where the frame shows no body, NotFoundError for an unknown frame.
     """
     tree = body or session.body()
-    settings = session_settings(session, DEFAULT_TRACKER, weighting)
+    small = weighting == WEIGHTING and not follows_height(tree)
+    settings = (
+        session_settings(session, DEFAULT_TRACKER, SILHOUETTES, BY_SILHOUETTES)
+        if small
+        else session_settings(session, DEFAULT_TRACKER, weighting)
+    )
     if device != CPU:
         settings = changed_settings(settings, {"device": device})
     prototypes = None
@@ -144,8 +156,9 @@ def initialise(
     check_seen(session, masks)
     hull, box, note = hull_of(tree, cameras, masks)
     space = search_space(tree, session_sigma(session, tree, session.manifest.fps))
+    problem = whole_problem(tree, cameras, settings, evidence)
     start = seek(
-        whole_problem(tree, cameras, settings, evidence),
+        problem,
         space,
         tree,
         hull,
@@ -160,7 +173,11 @@ def initialise(
     start = facing_as_said(start, len(cameras), votes)
     if start.margin < 0.0:
         note = f"{note} {TURNED}".strip()
-    stands = limbs_put_right(tree, cameras, masks, start.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
+    draw = len(cameras) >= FEWEST_VIEWS
+    stands = limbs_put_right(tree, cameras, masks, start.pose, seed, draw=draw)
+    if not follows_height(tree) and start.rival is not None:
+        other = limbs_put_right(tree, cameras, masks, start.rival, seed, draw=draw)
+        start, stands = better_facing(problem, len(cameras), start, stands, other)
     shares = stands.off.shares()
     contradicted = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
     if contradicted:
@@ -170,7 +187,7 @@ def initialise(
         body=tree.name,
         names=parameter_names(tree),
         pose=stands.pose,
-        confidence=start.confidence * trust(max(shares.values(), default=0.0)),
+        confidence=start.confidence * trust(contradicted_share(tree, stands)),
         margin=start.margin,
         rival=start.rival,
         agreement=start.agreement,
@@ -179,6 +196,25 @@ def initialise(
         evaluations=start.evaluations,
         note=note,
     )
+
+
+def better_facing(
+    problem: FrameLikelihood, cameras: int, start: FoundStart, stands: Hypothesis, other: Hypothesis
+) -> tuple[FoundStart, Hypothesis]:
+    """The start and its pose put right, or its rival put right where that weighs more, with the margin between them."""
+    own, rival = (float(weight) for weight in problem.log_likelihood(np.stack([stands.pose, other.pose])))
+    margin, turned = abs(own - rival), rival > own
+    best, second = (other, stands) if turned else (stands, other)
+    start = dataclasses.replace(
+        start,
+        pose=best.pose,
+        rival=second.pose,
+        log_weight=max(own, rival),
+        margin=margin,
+        agreement=1.0 - start.agreement if turned else start.agreement,
+        confidence=confidence(facing_odds(margin, cameras)),
+    )
+    return start, best
 
 
 def facing_as_said(start: FoundStart, cameras: int, votes: float) -> FoundStart:
@@ -193,6 +229,16 @@ def facing_as_said(start: FoundStart, cameras: int, votes: float) -> FoundStart:
             margin=-start.margin, agreement=1.0 - start.agreement, confidence=confidence(-odds),
         )  # fmt: skip
     return dataclasses.replace(start, confidence=confidence(odds))
+
+
+def contradicted_share(body: BodyModel, stands: Hypothesis) -> float:
+    """The largest share of a limb's area that the masks contradict; of bodies other than people the share of the whole
+    body: their thin limbs are missing in masks more often than they are lost.
+    """
+    if follows_height(body):
+        return max(stands.off.shares().values(), default=0.0)
+    off = stands.off
+    return float((off.outside + off.bare).sum() / max(off.area.sum(), 1.0))
 
 
 def trust(most: float) -> float:

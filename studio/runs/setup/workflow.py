@@ -24,6 +24,7 @@ from studio.runs.setup.silhouette_faults import known_faults
 from studio.runs.setup.turned_cameras import misses_in_words
 from studio.runs.tracks import best_track
 from studio.sessions.background_files import (
+    ANIMAL_MASKS,
     CHOSEN_MASKS,
     PERSON_MASKS,
     STROKE_MASKS,
@@ -72,6 +73,7 @@ CHANGED = {
 
 
 MADE_WORDS = {
+    ANIMAL_MASKS: "the animal, cut out before the empty place",
     PERSON_MASKS: "the person, cut out by a network",
     STROKE_MASKS: "cut out by brush strokes",
     CHOSEN_MASKS: "each camera's best source",

@@ -15,8 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from studio.body.branches import within_limits
+from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.mirroring import name_twins
 from studio.body.model import BodyModel
+from studio.evidence.volume.alignment import root_parameters, with_root_at
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
@@ -49,6 +52,11 @@ BETTER = 0.85
 """Share of the loss below which another pose is taken. Masks cut off by a box lower it by a tenth (a rendered walk
 behind boxes: with 0.95, 117 mm instead of 40); for a lost limb the right place has a third to four fifths of the
 loss."""
+BETTER_CHAIN, BETTER_TURNED = 0.97, 0.95
+"""The same of a chain such as a tail, which has little of the border, and of the whole body turned round."""
+MOST_TOGETHER, KEPT_ALONG, DRAWS_ALONG = 7, 6, 160
+"""Angles of a limb that are drawn at once: draws of a tail of eight never lie on it. Of a longer one, how many poses
+are kept from joint to joint, and how many are drawn from each."""
 REDRAWN = 0x11A6
 
 
@@ -190,20 +198,24 @@ class SeenFrame:
         """The hypothesis refined further."""
         return self.hypothesis(self.refiner.refine(refined.pose, self.silhouettes).pose)
 
-    def better(self, than: Hypothesis, start: Array) -> Hypothesis:
-        """The hypothesis refined from a start (D,), if that is clearly better than `than`; else `than`."""
+    def better(self, than: Hypothesis, start: Array, share: float = BETTER) -> Hypothesis:
+        """The hypothesis refined from a start (D,), if that is clearly better than `than`, with at most that share of
+        its loss; else `than`.
+        """
         pose = self.refiner.refine(start, self.silhouettes).pose
-        if self.refiner.loss_with_pull(pose, self.silhouettes) >= BETTER * than.loss:
+        if self.refiner.settled_loss(pose, self.silhouettes) >= share * than.loss:
             return than
         return self.hypothesis(pose)
 
-    def best_of(self, than: Hypothesis, drawn: Array, own: Sequence[int]) -> Hypothesis:
+    def best_of(
+        self, than: Hypothesis, drawn: Array, own: Sequence[int], share: float = BETTER
+    ) -> Hypothesis:
         """The best of `than` and of the refined poses among those drawn (N, D) that disagree least with the
-        silhouettes. own : the angles that were drawn.
+        silhouettes. own : the angles that were drawn. share : as in `better`.
         """
         off = self.agreement.of_places(drawn, self.silhouettes)
         for start in _best_apart(drawn, off, own, REFINED_DRAWS):
-            than = self.better(than, start)
+            than = self.better(than, start, share)
         return than
 
 
@@ -224,7 +236,14 @@ def redrawn(
         limb = max(doubtful, key=lambda name: shares[name])
         tried.add(limb)
         own = bent_by(frame.refiner, limb)
-        if len(own) > 1:
+        if len(own) > MOST_TOGETHER:
+            drawn, weighed = drawn_along(rng, frame, found.pose, own)
+            found = frame.best_of(found, drawn, own, BETTER_CHAIN)
+            evaluations += weighed
+            if found.off.shares()[limb] > LIMB_LOST_SHARE:
+                found, weighed = _turned_round(rng, found, frame, own)
+                evaluations += weighed
+        elif len(own) > 1:
             drawn = _drawn(rng, frame.refiner, found.pose[None], own)
             found = frame.best_of(found, drawn, own)
             evaluations += len(drawn)
@@ -260,18 +279,75 @@ def bent_by(refiner: Refiner, limb: str) -> list[int]:
     return [n for n, entry in enumerate(refiner.body.parameters) if entry.limb == limb and refiner.bounded[n]]
 
 
-def _drawn(rng: np.random.Generator, refiner: Refiner, poses: Array, own: Sequence[int]) -> Array:
-    """(K · DRAWS, D) poses from poses (K, D) with angles `own` drawn: one part about their values, one over their
+def _drawn(
+    rng: np.random.Generator, refiner: Refiner, poses: Array, own: Sequence[int], draws: int = DRAWS
+) -> Array:
+    """(K · draws, D) poses from poses (K, D) with angles `own` drawn: one part about their values, one over their
     range.
     """
     lower, upper = refiner.lower[own], refiner.upper[own]
-    reach, part = upper - lower, DRAWS // (2 * len(SPREADS))
-    drawn = np.repeat(poses[:, None], DRAWS, axis=1)
+    reach, part = upper - lower, draws // (2 * len(SPREADS))
+    drawn = np.repeat(poses[:, None], draws, axis=1)
     now = poses[:, None, own]
     near = [now + spread * reach * rng.standard_normal((len(poses), part, len(own))) for spread in SPREADS]
-    anywhere = lower + reach * rng.random((len(poses), DRAWS - part * len(SPREADS), len(own)))
+    anywhere = lower + reach * rng.random((len(poses), draws - part * len(SPREADS), len(own)))
     drawn[:, :, own] = np.clip(np.concatenate([*near, anywhere], axis=1), lower, upper)
     return drawn.reshape(-1, poses.shape[1])
+
+
+def _turned_round(
+    rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, own: Sequence[int]
+) -> tuple[Hypothesis, int]:
+    """The hypothesis, or the body turned by half a turn about the vertical with its tail (angles `own`) drawn again, if
+    that is better; and the number of poses compared. Both ends of an animal look alike but for the tail.
+    """
+    turned = turned_pose(frame.refiner.body, found.pose)
+    if turned is None:
+        return found, 0
+    other = frame.hypothesis(frame.refiner.refine(turned, frame.silhouettes).pose)
+    drawn, weighed = drawn_along(rng, frame, other.pose, own)
+    other = frame.best_of(other, drawn, own, 1.0)
+    return (other if other.loss < BETTER_TURNED * found.loss else found), weighed
+
+
+def turned_pose(body: BodyModel, pose: Array) -> Array | None:
+    """(D,) a pose turned by half a turn about the vertical through the middle of its trunk; None of a body that is
+    fixed to the world.
+    """
+    parameters = root_parameters(body)
+    trunk = [number for number, limb in enumerate(body.drawn) if limb.part == "trunk"]
+    if not len(parameters) or not trunk:
+        return None
+    root = next(number for number, joint in enumerate(body.joints) if joint.parent < 0)
+    frame, middle = joint_frames(body, pose)[0, root], limb_ends(body, pose)[0, trunk].mean(axis=(0, 1))
+    half = np.diag([-1.0, -1.0, 1.0])
+    target = half @ frame
+    target[:, 3] += middle - half @ middle
+    return within_limits(body, with_root_at(body, root, parameters, pose, target))
+
+
+def drawn_along(
+    rng: np.random.Generator, frame: SeenFrame, pose: Array, own: Sequence[int]
+) -> tuple[Array, int]:
+    """(N, D) poses with a long chain drawn joint by joint from the root on, so that it follows what the silhouettes
+    show of it; and the number of poses compared. What lies beyond a joint is straight while that is drawn.
+    """
+    refiner = frame.refiner
+    straight = pose.copy()
+    straight[list(own)] = refiner.neutral[list(own)]
+    kept, weighed = straight[None], 0
+    for joint in _joints_of(refiner.body, own):
+        drawn = np.concatenate([kept, _drawn(rng, refiner, kept, joint, DRAWS_ALONG)])
+        off = frame.agreement.of_places(drawn, frame.silhouettes)
+        kept = np.array(_best_apart(drawn, off, joint, KEPT_ALONG))
+        weighed += len(drawn)
+    return kept, weighed
+
+
+def _joints_of(body: BodyModel, own: Sequence[int]) -> list[list[int]]:
+    """The angles `own` by the joint that they turn, parents first."""
+    turned = [[step.parameter for step in joint.steps if step.parameter in own] for joint in body.joints]
+    return [angles for angles in turned if angles]
 
 
 def _best_apart(drawn: Array, off: Array, own: Sequence[int], most: int) -> list[Array]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.branches import within_limits
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
 from studio.evidence.volume.alignment import axes_of_pose, root_candidates, root_parameters, with_root_at
@@ -110,7 +111,7 @@ def _roots(body: BodyModel, hull: Hull | None, root: IntArray) -> Array:
         found.append(with_root_at(body, number, root, body.neutral, wanted))
     if hull is not None:
         found += _laid(body, hull, number)
-    return np.stack(found)
+    return np.stack([within_limits(body, pose) for pose in found])
 
 
 def _laid(body: BodyModel, hull: Hull, number: int) -> list[Array]:

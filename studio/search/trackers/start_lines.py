@@ -29,6 +29,8 @@ DRAWN = 6
 NEAR = 0.12
 PLACED, COMBINED = 400, 20
 """Poses tried for each limb of a pair while the other is fixed, and how many of the best are combined."""
+MOST_TOGETHER = 7
+"""Parameters of a limb that are drawn at once; draws of a tail of eight never lie on it."""
 IMPOSSIBLE = 1e6
 OPPOSITE_LINES = 2
 """Lines that face the other way than the best one and are kept whatever they weigh."""
@@ -109,6 +111,7 @@ class LineSteps:
         self._counting = threading.Lock()
         self._space, self._rest = space, rest
         self._limbs = _searched_limbs(space)
+        self._parts = [_in_parts(space, limb) for limb in self._limbs]
         self._pairs = _pairs(space, self._limbs)
 
     def improved(
@@ -118,7 +121,8 @@ class LineSteps:
         lines whose limbs are tried on it.
         """
         for number in rng.permutation(len(self._limbs)):
-            line = self._with_limb(rng, line, self._limbs[int(number)], others, entry.limb_particles)
+            for part in self._parts[int(number)]:
+                line = self._with_limb(rng, line, part, others, entry.limb_particles)
         for pair in self._pairs:
             line = self._with_pair(rng, line, pair, others, entry.limb_particles)
         found = self.annealed(rng, line.pose[None], noise, entry.particles, WHOLE_LAYERS)
@@ -219,6 +223,16 @@ def _searched_limbs(space: SearchSpace) -> tuple[IntArray, ...]:
     groups = [np.flatnonzero(space.limb == number) for number in np.unique(space.limb)]
     below = [group for group in groups if (space.hierarchy.depth[group] > 0).all()]
     return tuple(group for group in below if bounded[group].all())
+
+
+def _in_parts(space: SearchSpace, limb: IntArray) -> list[IntArray]:
+    """A limb's parameters in the parts that are searched one after the other: all together, of a long chain the near
+    part and then the far one.
+    """
+    if len(limb) <= MOST_TOGETHER:
+        return [limb]
+    depths = space.hierarchy.depth[limb]
+    return [limb[depths == depth] for depth in np.unique(depths)]
 
 
 def _pairs(space: SearchSpace, limbs: tuple[IntArray, ...]) -> tuple[tuple[IntArray, IntArray], ...]:

@@ -1,0 +1,364 @@
+"""Masks of one animal, or of anything else that is small, casts shadows and has thin limbs, before known backgrounds.
+
+The agreement of views cannot tell a body from its shadow or its reflection in the floor, as both lie where all cameras
+see them; colour can. What a camera cannot see, because the background there has the subject's own colour, the others
+know. And a tail is as wide as the noise that a clean-up removes. So, frame by frame, from each camera's difference to
+its empty picture:
+
+1. The body: what differs, but for all that is the background in a shade of its own colour, no darker than the shadows
+   of this footage: the brightness below which the subject begins is the valley of the shares of all pixels.
+2. Filled in: pixels of the subject's colour before a background of that colour, where the other views' hull lies.
+3. What the hull of all views does not reach is something else: litter, reflections in the floor or in glass.
+4. Thin limbs: ridges of what remains of the difference without its shadow, above what that is at most times, if they
+   lie in a chain that begins at the body.
+
+Lengths are in units of the subject's size in the picture, so that they mean the same at any resolution.
+"""
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.evidence.background import GaussianBackground
+from studio.evidence.masks import cleaned, disc
+from studio.evidence.settings import EvidenceSettings
+from studio.evidence.volume.hull import Hull
+from studio.evidence.volume.hull_settings import HullSettings
+from studio.evidence.volume.reconstruction import Reconstructor, check_views
+from studio.evidence.volume.tracking_space import Box
+from studio.footage.capture.footage import Footage
+from studio.foundations.arrays import Bytes, Floats, Mask
+from studio.foundations.errors import FootageError
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress
+from studio.runs.setup.person_hull import covered, large_hull, person_box, spread_frames
+
+Levels = NDArray[np.uint8 | np.float32]
+CUTTING = "cutting the animal out"
+LEARNT_FRAMES = 20
+"""Frames from which colours, shadows and what changes all the time are learnt."""
+SUBJECT_SIDE = 50.0
+"""Pixels, root of the area, of the subject for which the lengths below are given."""
+OPENED, CLOSED, THIN, GAP, LEAST_THIN = 1.0, 2.0, 4.0, 4.0, 14.0
+"""Radii of specks and of slits; half the width that thin limbs have at most; half a gap in their chain; its length."""
+SHADOW_COLOUR = 0.07
+"""How far the colour of a shadow may lie from the background's: reflections in a floor are tinted."""
+OWN_COLOUR = 0.025
+"""The same where pieces are thin: no shadow of a body is."""
+USUAL_DARKEST, LEAST_DARKEST, MOST_DARKEST = 0.4, 0.3, 0.6
+FEWEST_DARK = 0.2
+"""Share of what differs that is darker than shadows where the subject is dark."""
+LIKE, ALIKE, WIDEST = (2.0, 95.0), 1.4, 60.0
+"""Percentiles of the subject's brightness that are its colour; by how much the background's may exceed them; and the
+largest range of them, grey levels, with which anything is filled in."""
+RIDGE, MOST_RIDGE, MOST_USUAL = 6.0, 40.0, 12.0
+"""Grey levels by which a thin limb stands out; more does not count; and at most is usual of a pixel."""
+SHAKEN = 1.0
+"""Pixels by which a camera may have moved since its background was taken: so much of an edge there is no limb."""
+SELDOM, CHANGED = 15.0, 10.0
+"""Percent of the frames in which a background is seen where it is right, and grey levels by which it is off else."""
+RIM = 2.0
+"""Pixels beyond the hull within which a mask is confirmed."""
+HOLE = 150.0
+"""Pixels of the largest hole that is filled."""
+REACH = 3.0
+"""Sizes of the subject within which its thin limbs end."""
+CARVING = HullSettings(hull_depth=7, hull_least_views=2)
+MARGIN = np.array([120.0, 120.0, 480.0])
+"""mm at a person's size (`scale_of`) around the masks' hull in which the others' hulls are carved: where a camera
+sees no upper half, a subject may be twice as high."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learnt:
+    """What a camera's footage shows. model : its background. settings, own : masks without all shadows, and without
+    those of the background's very colour. colours : least and most brightness of the subject. usual : (H, W) of
+    `unshaded`. unit : pixels that a length of 1 has.
+    """
+
+    model: GaussianBackground
+    settings: EvidenceSettings
+    own: EvidenceSettings
+    colours: tuple[float, float]
+    usual: Floats
+    unit: float
+
+
+def animal_masks(
+    cameras: Sequence[Camera],
+    footage: Footage,
+    backgrounds: Mapping[str, Bytes],
+    scale: float,
+    progress: Progress,
+) -> Iterator[tuple[int, dict[str, Bytes]]]:
+    """Number and masks, (H, W) 0 or 255 by camera, of every frame in turn.
+
+    backgrounds : (H, W, 3) of each camera. scale : of the body (`scale_of`). Raises FootageError where nothing differs
+    from the backgrounds.
+    """
+    check_views(cameras)
+    cv2.setNumThreads(1)
+    with ThreadPoolExecutor(max(1, min(len(cameras), 2)), "animal masks") as threads:
+        learnt = list(
+            threads.map(
+                partial(learn, footage=footage, backgrounds=backgrounds), [one.name for one in cameras]
+            )
+        )
+        views = list(zip(cameras, learnt, strict=True))
+        for frame in range(footage.frame_count):
+            absent = footage.absent(frame)
+            seeing = [(camera, one) for camera, one in views if camera.name not in absent]
+            pictures = [footage.picture(camera.name, frame) for camera, _ in seeing]
+            masks = list(threads.map(body_alone, pictures, [one for _, one in seeing]))
+            if len(seeing) > 1:
+                masks = _by_all_views(masks, pictures, seeing, scale)
+            masks = list(threads.map(with_thin_limbs, masks, pictures, [one for _, one in seeing]))
+            of_frame = {camera.name: mask for (camera, _), mask in zip(seeing, masks, strict=True)}
+            for name in absent:
+                width, height = footage.size(name)
+                of_frame[name] = np.zeros((height, width), np.uint8)
+            yield frame, of_frame
+            progress(CUTTING, frame + 1, footage.frame_count)
+
+
+def learn(name: str, footage: Footage, backgrounds: Mapping[str, Bytes]) -> Learnt:
+    frames = [
+        frame
+        for frame in spread_frames(footage.frame_count, LEARNT_FRAMES)
+        if name not in footage.absent(frame)
+    ]
+    pictures = [footage.picture(name, frame) for frame in frames]
+    model = GaussianBackground(without_ghosts(backgrounds[name], pictures))
+    changed = EvidenceSettings(mask_shadow_test=False, mask_opening=3, mask_closing=0)
+    masks = [cleaned(model.foreground(picture, changed), changed) for picture in pictures]
+    if not any(mask.any() for mask in masks):
+        raise FootageError(
+            f"Nothing in the pictures of camera {name} differs from its background.",
+            "Give a picture of the empty place, taken with the same camera in the same position.",
+        )
+    shares = [_share(model, picture)[mask > 0] for picture, mask in zip(pictures, masks, strict=True)]
+    settings = EvidenceSettings(
+        mask_opening=0, mask_closing=0, mask_fill_holes=0, mask_min_component=0,
+        mask_shadow_darkest=darkest_shadow(np.concatenate(shares)), mask_shadow_colour=SHADOW_COLOUR,
+    )  # fmt: skip
+    bodies = [_largest(model.foreground(picture, settings)) for picture in pictures]
+    unit = float(np.sqrt(np.median([np.count_nonzero(body) for body in bodies]))) / SUBJECT_SIDE
+    cores = [cv2.erode(body, disc(_pixels(2.0 * CLOSED, unit))) > 0 for body in bodies]
+    brightness = np.concatenate(
+        [picture[core].max(axis=1) for picture, core in zip(pictures, cores, strict=True)]
+    )
+    low, high = np.percentile(brightness, LIKE) if len(brightness) else (0.0, 255.0)
+    darkest = settings.mask_shadow_darkest
+    usual = np.median(
+        [unshaded(picture, model.mean, model.gain(picture), darkest) for picture in pictures], axis=0
+    )
+    own = dataclasses.replace(settings, mask_shadow_colour=OWN_COLOUR)
+    usual = np.minimum(1.3 * usual, MOST_USUAL) + SHAKEN * _steepness(model)
+    return Learnt(model, settings, own, (float(low), float(high)), usual.astype(np.float32), unit)
+
+
+def without_ghosts(background: Bytes, pictures: Sequence[Bytes]) -> Bytes:
+    """(H, W, 3) a background, the median of the pictures where nearly none of them looks like it, but for where the
+    animal itself may be in all of them.
+
+    What is wrong is an animal that sat there while the background was taken. If animals are darker than the
+    background, the pictures are brighter there, and the other way round.
+    """
+    stack = np.stack(pictures)
+    expected = background * GaussianBackground(background).gain(pictures[len(pictures) // 2])
+    off = stack - expected
+    away = np.abs(off).max(axis=3)
+    seldom, often = np.percentile(away, [SELDOM, 100.0 - SELDOM], axis=0)
+    brighter = off.mean(axis=3)
+    passing = (often > 2.0 * CHANGED) & (seldom < CHANGED)
+    extreme = np.take_along_axis(brighter, np.abs(brighter).argmax(axis=0)[None], axis=0)[0]
+    sign = np.sign(np.median(extreme[passing])) if passing.any() else 0.0
+    wrong = (seldom > CHANGED) & (np.sign(np.median(brighter, axis=0)) == -sign)
+    grown = cv2.dilate(_opened(np.where(wrong, np.uint8(255), np.uint8(0)), 1.0, 1.0), disc(2))
+    return np.where(grown[..., None] > 0, np.median(stack, axis=0).astype(np.uint8), background)
+
+
+def darkest_shadow(shares: Floats) -> float:
+    """The share of the background's brightness that divides a dark subject from its shadows.
+
+    shares : (N,) of what differs from the background. Where little is darker than any shadow: the usual one.
+    """
+    darker = shares[shares < 1.0]
+    if not len(darker) or np.mean(darker < USUAL_DARKEST) < FEWEST_DARK:
+        return USUAL_DARKEST
+    counts, edges = np.histogram(darker, bins=50, range=(0.0, 1.0))
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    below, above = np.cumsum(counts), len(darker) - np.cumsum(counts)
+    sums = np.cumsum(counts * middles)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        between = below * above * np.square(sums / below - (sums[-1] - sums) / above)
+    best = float(edges[1 + int(np.nanargmax(between))])
+    return float(np.clip(best, LEAST_DARKEST, MOST_DARKEST))
+
+
+def unshaded(picture: Bytes, background: Levels, gain: Floats, darkest: float) -> Floats:
+    """(H, W) grey levels by which a picture differs from its background, shades of which do not count.
+
+    background : (H, W, 3). gain : (3,) of its colours. darkest : share of its brightness that a shade has at least.
+    """
+    blurred = cv2.GaussianBlur(picture, (3, 3), 0.8).astype(np.float32)
+    expected = background.astype(np.float32) * gain
+    norm = np.maximum(np.square(expected).sum(axis=2), 1.0)
+    dot = (blurred * expected).sum(axis=2)
+    share = dot / norm
+    beside = np.sqrt(np.maximum(np.square(blurred).sum(axis=2) - share * dot, 0.0))
+    whole = np.sqrt(np.square(blurred - expected).sum(axis=2))
+    return np.asarray(np.where((share > darkest) & (share < 1.0), beside, whole), dtype=np.float32)
+
+
+def _steepness(model: GaussianBackground) -> Floats:
+    """(H, W) grey levels by which the background changes over a pixel, at the steepest one nearby."""
+    grey = model.mean.astype(np.float32).mean(axis=2)
+    across, down = (
+        np.asarray(cv2.Sobel(grey, cv2.CV_32F, *way, scale=0.125), np.float32) for way in ((1, 0), (0, 1))
+    )
+    return np.asarray(cv2.dilate(np.hypot(across, down), disc(1)), np.float32)
+
+
+def _share(model: GaussianBackground, picture: Bytes) -> Floats:
+    """(H, W) brightness as a share of the background's."""
+    expected = model.mean.astype(np.float32) * model.gain(picture)
+    dot = (picture.astype(np.float32) * expected).sum(axis=2)
+    return np.asarray(dot / np.maximum(np.square(expected).sum(axis=2), 1.0), dtype=np.float32)
+
+
+def body_alone(picture: Bytes, learnt: Learnt) -> Bytes:
+    """The mask of one view alone: the body, and thin pieces that touch it."""
+    unit, model = learnt.unit, learnt.model
+    body = _closed(model.foreground(picture, learnt.settings), CLOSED, unit)
+    body = _opened(body, OPENED, unit)
+    loose = model.foreground(picture, learnt.own)
+    thin = loose & ~np.asarray(cv2.dilate(_opened(loose, THIN, unit), disc(1)), np.uint8)
+    both = body | thin
+    joined = _closed(both, CLOSED, unit)
+    return _closed(both, OPENED, unit) & _touching(joined, _opened(body, THIN, unit))
+
+
+def _by_all_views(
+    masks: list[Bytes], pictures: Sequence[Bytes], views: Sequence[tuple[Camera, Learnt]], scale: float
+) -> list[Bytes]:
+    """The masks filled in, and without what no other view confirms."""
+    cameras = tuple(camera for camera, _ in views)
+    box = person_box(masks, cameras, scale)
+    if box is None:
+        return masks
+    lower, upper = box.lower - scale * MARGIN, box.upper + scale * MARGIN
+    carver = Reconstructor(cameras, Box(np.array([*lower[:2], max(lower[2], 0.0)]), upper), CARVING)
+    first = list(masks)
+    for number, (camera, learnt) in enumerate(views):
+        unknown = unknown_pixels(pictures[number], learnt)
+        if not unknown.any():
+            continue
+        others = [cv2.dilate(mask, disc(1)) for mask in masks]
+        others[number] = np.full_like(masks[number], 255)
+        hull = carver.shape([np.asarray(mask, np.uint8) for mask in others])
+        filled = (covered(None if hull.empty else hull, camera) > 0) & unknown
+        if filled.any():
+            more = _opened(np.where(filled, np.uint8(255), np.uint8(0)), CLOSED, learnt.unit)
+            masks[number] = first[number] | _touching(
+                _closed(first[number] | more, CLOSED, learnt.unit), first[number]
+            )
+    hull = large_hull(carver, [np.asarray(cv2.dilate(mask, disc(2)), np.uint8) for mask in masks])
+    return [_reached(mask, hull, camera, one.unit) for mask, (camera, one) in zip(masks, views, strict=True)]
+
+
+def unknown_pixels(picture: Bytes, learnt: Learnt) -> Mask:
+    """(H, W) where the picture has the subject's colour, and so has the background."""
+    low, high = learnt.colours
+    if high - low > WIDEST:
+        return np.zeros(picture.shape[:2], np.bool_)
+    behind = _brightest(learnt.model.mean)
+    own = (_brightest(picture) <= ALIKE * high) & (behind <= ALIKE * high)
+    return own & (behind >= low / ALIKE)
+
+
+def _reached(mask: Bytes, hull: Hull | None, camera: Camera, unit: float) -> Bytes:
+    """What of a mask lies on a hull, but for a rim; all without a hull."""
+    if hull is None:
+        return mask
+    near = np.asarray(cv2.dilate(covered(hull, camera), disc(_pixels(RIM, unit))), np.uint8)
+    return _opened(mask & near, OPENED, unit)
+
+
+def with_thin_limbs(mask: Bytes, picture: Bytes, learnt: Learnt) -> Bytes:
+    """A mask, its holes filled, with the thin limbs that begin at it."""
+    unit, gap = learnt.unit, _pixels(GAP, learnt.unit)
+    left, top, width, height = cv2.boundingRect(mask)
+    if not width:
+        return mask
+    reach = _pixels(REACH * SUBJECT_SIDE, unit)
+    part = slice(max(0, top - reach), top + height + reach), slice(max(0, left - reach), left + width + reach)
+    whole, mask = (
+        mask.copy(),
+        cleaned(mask[part], dataclasses.replace(learnt.settings, mask_fill_holes=_pixels(HOLE, unit * unit))),
+    )
+    darkest = learnt.settings.mask_shadow_darkest
+    differs = unshaded(picture[part], learnt.model.mean[part], learnt.model.gain(picture), darkest)
+    differs = np.maximum(np.minimum(differs, MOST_RIDGE) - learnt.usual[part], 0.0)
+    ridges = differs - np.asarray(
+        cv2.morphologyEx(differs, cv2.MORPH_OPEN, disc(_pixels(THIN, unit))), np.float32
+    )
+    found = np.where((ridges > RIDGE) & (cv2.dilate(mask, disc(1)) == 0), np.uint8(255), np.uint8(0))
+    found = _longer(found, 0.4 * LEAST_THIN * unit)
+    chained = found & _touching(np.asarray(cv2.dilate(found | mask, disc(gap)), np.uint8), mask)
+    wide = np.asarray(cv2.dilate(chained, disc(gap)), np.uint8)
+    chained &= _longer(wide, LEAST_THIN * unit + 2.0 * gap)
+    near = np.asarray(cv2.dilate(chained, disc(2 * gap)), np.uint8)
+    line = cv2.erode(cv2.dilate(chained | mask, disc(gap)), disc(max(1, gap - 1)))
+    bridges = np.where((differs > 0.5 * RIDGE) & (line > 0) & (near > 0), np.uint8(255), np.uint8(0))
+    whole[part] = mask | chained | bridges
+    return whole
+
+
+def _brightest(picture: Levels) -> Levels:
+    """(H, W) the brightest of each pixel's colours."""
+    return np.maximum(np.maximum(picture[..., 0], picture[..., 1]), picture[..., 2])
+
+
+def _pixels(length: float, unit: float) -> int:
+    return max(1, round(length * unit))
+
+
+def _opened(mask: Bytes, radius: float, unit: float) -> Bytes:
+    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc(_pixels(radius, unit))), np.uint8)
+
+
+def _closed(mask: Bytes, radius: float, unit: float) -> Bytes:
+    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, disc(_pixels(radius, unit))), np.uint8)
+
+
+def _touching(mask: Bytes, seeds: Bytes) -> Bytes:
+    """The pieces of a mask with any pixel of the seeds (H, W)."""
+    count, found = cv2.connectedComponents(mask)
+    pieces = np.asarray(found, np.int32)
+    kept = np.zeros(count, np.uint8)
+    kept[np.unique(pieces[seeds > 0])] = 255
+    kept[0] = 0
+    return np.asarray(kept[pieces], np.uint8)
+
+
+def _longer(mask: Bytes, least: float) -> Bytes:
+    """The pieces of a mask whose box has a diagonal of at least so many pixels."""
+    _, pieces, boxes, _ = cv2.connectedComponentsWithStats(mask)
+    kept = np.where(np.hypot(boxes[:, 2], boxes[:, 3]) >= least, np.uint8(255), np.uint8(0))
+    kept[0] = 0
+    return np.asarray(kept[np.asarray(pieces, np.int32)], np.uint8)
+
+
+def _largest(mask: Bytes) -> Bytes:
+    """The largest piece of a mask."""
+    _, pieces, boxes, _ = cv2.connectedComponentsWithStats(mask)
+    if len(boxes) == 1:
+        return mask
+    return np.where(pieces == 1 + int(np.argmax(boxes[1:, cv2.CC_STAT_AREA])), np.uint8(255), np.uint8(0))
