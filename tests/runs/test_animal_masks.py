@@ -66,7 +66,7 @@ def test_the_shadow_is_left_out_and_the_tail_is_kept(learnt: "animal_masks.Learn
     assert np.count_nonzero(mask & tail) > 0.8 * np.count_nonzero(tail)
     # The shadows that the views agree on are body to the usual test.
     wide = EvidenceSettings(mask_shadow_darkest=0.75, mask_shadow_colour=0.03)
-    usual, beside = learnt.model.foreground(picture, wide), elsewhere & (body == 0)
+    usual, beside = learnt.model.foreground(picture, wide).mask, elsewhere & (body == 0)
     assert np.count_nonzero((usual > 0) & beside) > 4 * np.count_nonzero((mask > 0) & beside)
 
 

@@ -71,7 +71,7 @@ SMALL = tuple(
 
 def rearing_mouse(**changed: float) -> np.ndarray:
     """Reared up, the tail on the floor behind it."""
-    mouse = load_body("mouse")
+    mouse = load_body("mouse31")
     names = [entry.name for entry in mouse.parameters]
     pose, values = mouse.neutral, {"pitch": -1.2, "pelvis_z": 40.0, "left_haunch_swing": -1.2, **changed}
     for name, value in {"right_haunch_swing": -1.2, "tail_lift": 1.2, "tail_2_wag": 0.6, **values}.items():
@@ -82,7 +82,7 @@ def rearing_mouse(**changed: float) -> np.ndarray:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_tail_of_many_joints_is_drawn_along_what_the_silhouettes_show_of_it(seed: int) -> None:
     """Of 1024 tails drawn at once the best still lies 6000 mm² or more beside the silhouettes."""
-    mouse, rng = load_body("mouse"), np.random.default_rng(seed)
+    mouse, rng = load_body("mouse31"), np.random.default_rng(seed)
     wags = {f"tail_{number}_wag": rng.uniform(-1.0, 1.0) for number in (2, 3, 4)}
     truth, hidden = rearing_mouse(**wags), rearing_mouse(tail_lift=-0.9, tail_2_lift=-0.7, tail_2_wag=-1.0)
     refiner, agreement = Refiner(mouse, SMALL, RefinementSettings()), Agreement(mouse, SMALL)
@@ -97,7 +97,7 @@ def test_a_tail_of_many_joints_is_drawn_along_what_the_silhouettes_show_of_it(se
 
 
 def test_a_mouse_is_turned_about_the_middle_of_its_trunk() -> None:
-    mouse, pose = load_body("mouse"), rearing_mouse(pitch=-0.4, heading=0.7)
+    mouse, pose = load_body("mouse31"), rearing_mouse(pitch=-0.4, heading=0.7)
     turned = turned_pose(mouse, pose)
     assert turned is not None
     assert ((turned >= mouse.lower) & (turned <= mouse.upper)).all()

@@ -136,7 +136,7 @@ def learn(name: str, footage: Footage, backgrounds: Mapping[str, Bytes]) -> Lear
     pictures = [footage.picture(name, frame) for frame in frames]
     model = GaussianBackground(without_ghosts(backgrounds[name], pictures))
     changed = EvidenceSettings(mask_shadow_test=False, mask_opening=3, mask_closing=0)
-    masks = [cleaned(model.foreground(picture, changed), changed) for picture in pictures]
+    masks = [cleaned(model.foreground(picture, changed).mask, changed) for picture in pictures]
     if not any(mask.any() for mask in masks):
         raise FootageError(
             f"Nothing in the pictures of camera {name} differs from its background.",
@@ -147,7 +147,7 @@ def learn(name: str, footage: Footage, backgrounds: Mapping[str, Bytes]) -> Lear
         mask_opening=0, mask_closing=0, mask_fill_holes=0, mask_min_component=0,
         mask_shadow_darkest=darkest_shadow(np.concatenate(shares)), mask_shadow_colour=SHADOW_COLOUR,
     )  # fmt: skip
-    bodies = [_largest(model.foreground(picture, settings)) for picture in pictures]
+    bodies = [_largest(model.foreground(picture, settings).mask) for picture in pictures]
     unit = float(np.sqrt(np.median([np.count_nonzero(body) for body in bodies]))) / SUBJECT_SIDE
     cores = [cv2.erode(body, disc(_pixels(2.0 * CLOSED, unit))) > 0 for body in bodies]
     brightness = np.concatenate(
@@ -236,9 +236,9 @@ def _share(model: GaussianBackground, picture: Bytes) -> Floats:
 def body_alone(picture: Bytes, learnt: Learnt) -> Bytes:
     """The mask of one view alone: the body, and thin pieces that touch it."""
     unit, model = learnt.unit, learnt.model
-    body = _closed(model.foreground(picture, learnt.settings), CLOSED, unit)
+    body = _closed(model.foreground(picture, learnt.settings).mask, CLOSED, unit)
     body = _opened(body, OPENED, unit)
-    loose = model.foreground(picture, learnt.own)
+    loose = model.foreground(picture, learnt.own).mask
     thin = loose & ~np.asarray(cv2.dilate(_opened(loose, THIN, unit), disc(1)), np.uint8)
     both = body | thin
     joined = _closed(both, CLOSED, unit)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.body.dimensions import follows_height, with_usual_feet
+from studio.body.dimensions import with_usual_feet
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
 from studio.evidence.frame_evidence import FrameEvidence
@@ -36,7 +36,7 @@ from studio.search.behaviour.model_file import read_model
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.edge_region import CPU
 from studio.search.settings import DEFAULT_TRACKER, RunSettings, changed_settings
-from studio.search.trackers.frame_refinement import Hypothesis
+from studio.search.trackers.frame_refinement import Hypothesis, has_tail
 from studio.search.trackers.initialisation import (
     PER_FAMILY,
     THOROUGH,
@@ -65,7 +65,7 @@ SILHOUETTES, BY_SILHOUETTES = (
     "edge-region-silhouette",
     {"edge_weight": 0.0, "region_weight": 0.0, "silhouette_weight": 5.0},
 )
-"""The likelihood of bodies that are not people's: areas alone. The edges of a tail two pixels wide are worth less than
+"""The likelihood of bodies with a tail: areas alone. The edges of a tail two pixels wide are worth less than
 no edges, so that with them a mouse whose tail is inside it, and which then faces the other way, weighs more."""
 HULL_DEPTH = 6
 FEWEST_VIEWS = 2
@@ -134,10 +134,10 @@ def initialise(
     Raises RunError where the frame shows no body, NotFoundError for an unknown frame.
     """
     tree = body or session.body()
-    small = weighting == WEIGHTING and not follows_height(tree)
+    tailed = has_tail(tree)
     settings = (
         session_settings(session, DEFAULT_TRACKER, SILHOUETTES, BY_SILHOUETTES)
-        if small
+        if tailed and weighting == WEIGHTING
         else session_settings(session, DEFAULT_TRACKER, weighting)
     )
     if device != CPU:
@@ -175,7 +175,7 @@ def initialise(
         note = f"{note} {TURNED}".strip()
     draw = len(cameras) >= FEWEST_VIEWS
     stands = limbs_put_right(tree, cameras, masks, start.pose, seed, draw=draw)
-    if not follows_height(tree) and start.rival is not None:
+    if tailed and start.rival is not None:
         other = limbs_put_right(tree, cameras, masks, start.rival, seed, draw=draw)
         start, stands = better_facing(problem, len(cameras), start, stands, other)
     shares = stands.off.shares()
@@ -232,10 +232,10 @@ def facing_as_said(start: FoundStart, cameras: int, votes: float) -> FoundStart:
 
 
 def contradicted_share(body: BodyModel, stands: Hypothesis) -> float:
-    """The largest share of a limb's area that the masks contradict; of bodies other than people the share of the whole
-    body: their thin limbs are missing in masks more often than they are lost.
+    """The largest share of a limb's area that the masks contradict; of a body with a tail the share of the whole body:
+    tails are missing in masks more often than they are lost.
     """
-    if follows_height(body):
+    if not has_tail(body):
         return max(stands.off.shares().values(), default=0.0)
     off = stands.off
     return float((off.outside + off.bare).sum() / max(off.area.sum(), 1.0))

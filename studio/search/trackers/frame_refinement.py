@@ -203,7 +203,7 @@ class SeenFrame:
         its loss; else `than`.
         """
         pose = self.refiner.refine(start, self.silhouettes).pose
-        if self.refiner.settled_loss(pose, self.silhouettes) >= share * than.loss:
+        if self.refiner.loss_with_pull(pose, self.silhouettes) >= share * than.loss:
             return than
         return self.hypothesis(pose)
 
@@ -308,6 +308,13 @@ def _turned_round(
     drawn, weighed = drawn_along(rng, frame, other.pose, own)
     other = frame.best_of(other, drawn, own, 1.0)
     return (other if other.loss < BETTER_TURNED * found.loss else found), weighed
+
+
+def has_tail(body: BodyModel) -> bool:
+    """Whether a limb of the body is a chain of more angles than are drawn at once."""
+    bounded = body.bounded_angles
+    limbs = [entry.limb for entry, limited in zip(body.parameters, bounded, strict=True) if limited]
+    return any(limbs.count(limb) > MOST_TOGETHER for limb in dict.fromkeys(limbs))
 
 
 def turned_pose(body: BodyModel, pose: Array) -> Array | None:
