@@ -236,7 +236,7 @@ def redrawn(
         limb = max(doubtful, key=lambda name: shares[name])
         tried.add(limb)
         own = bent_by(frame.refiner, limb)
-        if len(own) > MOST_TOGETHER:
+        if len(own) > MOST_TOGETHER and has_tail(frame.refiner.body):
             drawn, weighed = drawn_along(rng, frame, found.pose, own)
             found = frame.best_of(found, drawn, own, BETTER_CHAIN)
             evaluations += weighed
@@ -311,8 +311,12 @@ def _turned_round(
 
 
 def has_tail(body: BodyModel) -> bool:
-    """Whether a limb of the body is a chain of more angles than are drawn at once."""
+    """Whether a limb of the body is a chain of more angles than are drawn at once, and limits of its root keep the body
+    off its back: silhouettes alone do not.
+    """
     bounded = body.bounded_angles
+    if not bounded[root_parameters(body)].any():
+        return False
     limbs = [entry.limb for entry, limited in zip(body.parameters, bounded, strict=True) if limited]
     return any(limbs.count(limb) > MOST_TOGETHER for limb in dict.fromkeys(limbs))
 

@@ -227,9 +227,9 @@ def _searched_limbs(space: SearchSpace) -> tuple[IntArray, ...]:
 
 def _in_parts(space: SearchSpace, limb: IntArray) -> list[IntArray]:
     """A limb's parameters in the parts that are searched one after the other: all together, of a long chain the near
-    part and then the far one.
+    part and then the far one, where limits of the root keep the body off its back.
     """
-    if len(limb) <= MOST_TOGETHER:
+    if len(limb) <= MOST_TOGETHER or not (limited(space) & (space.hierarchy.depth == 0)).any():
         return [limb]
     depths = space.hierarchy.depth[limb]
     return [limb[depths == depth] for depth in np.unique(depths)]
