@@ -113,9 +113,9 @@ def background(
     """Choose where a session's masks come from, what does not count, and (on the command line) see how good they are.
 
     Sources: a background ("plate", "clip", "median", "combined"); "animal" (an animal before a picture of the empty
-    place: no shadows and reflections, a tail and legs a few pixels wide); "person" (a network cuts out a person; needs no
-    picture of the empty room, takes about a twentieth of a second a picture); "strokes" (anything, from a few brush
-    strokes in one or more pictures of each camera); "threshold" (by brightness and colour: knobs `mask_darkest`,
+    place: no shadows and reflections, a tail and legs a few pixels wide); "person" (a network cuts out a person;
+    needs no picture of the empty room, takes about a twentieth of a second a picture); "strokes" (anything, from a few
+    brush strokes in one or more pictures of each camera); "threshold" (by brightness and colour: knobs `mask_darkest`,
     `mask_brightest`, `mask_hue`, `mask_hue_reach`, `mask_saturation`); "masks" (that came with the footage); "best"
     (all of these are tried, and each camera gets the one under which views agree and borders lie on edges of the
     picture); "subject" (the masks in use, cut down to one of several subjects, who stands at `subject_at`; with any
