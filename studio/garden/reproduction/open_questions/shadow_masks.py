@@ -1,4 +1,5 @@
-"""The shadow test against true masks: how much of a body it takes for shadow, how much of a shadow for body.
+"""The shadow test against true masks: how much of a body it takes for shadow, how much of a shadow for body; each
+camera alone, and with what the others see of the floor.
 
 The clips of the half that chooses defaults are drawn anew, a few frames of each, for their exact masks; the two clips
 of others bring theirs.
@@ -14,15 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.background import GaussianBackground, gaussian_from_frames
+from studio.evidence.floor_shadows import cells_of, floor_shadows, with_cells
 from studio.evidence.masks import cleaned, disc
 from studio.evidence.settings import EvidenceSettings
 from studio.footage.capture.pictures import read_picture
 from studio.footage.capture.video import VideoReader, measure_video
 from studio.foundations.arrays import Bytes, evenly_spread
+from studio.foundations.geometry.camera import Camera
 from studio.garden.drawn_recipes import CHOOSING, KINDS, clip_name
 from studio.garden.reproduction.drawing import heat_chart
 from studio.garden.reproduction.experiment import Part, listed
-from studio.garden.reproduction.open_questions.other_people import ELSEWHERE
+from studio.garden.reproduction.open_questions.other_people import ELSEWHERE, imported
 from studio.results.comparison.findings import Table
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.statistics import number
@@ -30,14 +33,17 @@ from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.results.drawing_footage.real_data import PREFIX, located, real_data_folder
 from studio.results.drawing_footage.recipes import person_renderer
 
+ALONE: Mapping[str, Any] = {"mask_shadow_floor": False}
 CHOICES: Mapping[str, Mapping[str, Any]] = {
-    "each pixel alone, 0.04": {"mask_shadow_window": 1, "mask_shadow_colour": 0.04},
-    "each pixel alone, 0.015": {"mask_shadow_window": 1, "mask_shadow_colour": 0.015},
-    "5 pixels, 0.015": {"mask_shadow_colour": 0.015},
-    "5 pixels, 0.02": {"mask_shadow_colour": 0.02},
-    "5 pixels, 0.025": {},
-    "5 pixels, 0.03": {"mask_shadow_colour": 0.03},
-    "7 pixels, 0.025": {"mask_shadow_window": 7},
+    "each pixel alone, 0.04": {"mask_shadow_window": 1, "mask_shadow_colour": 0.04, **ALONE},
+    "each pixel alone, 0.015": {"mask_shadow_window": 1, "mask_shadow_colour": 0.015, **ALONE},
+    "5 pixels, 0.015": {"mask_shadow_colour": 0.015, **ALONE},
+    "5 pixels, 0.02": {"mask_shadow_colour": 0.02, **ALONE},
+    "5 pixels, 0.025": ALONE,
+    "5 pixels, 0.03": {"mask_shadow_colour": 0.03, **ALONE},
+    "7 pixels, 0.025": {"mask_shadow_window": 7, **ALONE},
+    "5 pixels, 0.025, on the floor": {},
+    "5 pixels, 0.04, on the floor": {"mask_shadow_colour": 0.04},
     "no shadow test": {"mask_shadow_test": False},
 }
 FRAMES, EMPTY_FRAMES = 5, 10
@@ -60,14 +66,24 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Of every choice: pixels of the body called background, of all it has; pixels beside it called body."""
     clip = str(arguments["clip"])
-    views = _views_of_others(clip) if clip.startswith(PREFIX) else _drawn_views(clip)
+    cameras, frames = _frames_of_others(clip, cache) if clip.startswith(PREFIX) else _drawn_frames(clip)
     counted = {name: np.zeros(3, np.int64) for name in CHOICES}
-    for picture, truth, background in views:
-        body, beside = _without_rim(truth)
+    tells = floor_shadows(cameras)
+    for views in frames:
+        parts = [_without_rim(truth) for _, truth, _ in views]
         for name, knobs in CHOICES.items():
             settings = dataclasses.replace(EvidenceSettings(), **knobs)
-            mask = cleaned(background.foreground(picture, settings).mask, settings) > 0
-            counted[name] += [(body & ~mask).sum(), (beside & mask).sum(), body.sum()]
+            seen = [background.foreground(picture, settings) for picture, _, background in views]
+            masks = [one.mask for one in seen]
+            if settings.mask_shadow_test and settings.mask_shadow_floor:
+                cells = [cells_of(*one) for one in seen]
+                masks = [
+                    with_cells(*one, chosen, own.size)
+                    for one, chosen, own in zip(seen, tells.unexplained(cells), cells, strict=True)
+                ]
+            for mask, (body, beside) in zip(masks, parts, strict=True):
+                final = cleaned(mask, settings) > 0
+                counted[name] += [(body & ~final).sum(), (beside & final).sum(), body.sum()]
     return {name: [int(value) for value in values] for name, values in counted.items()}
 
 
@@ -76,27 +92,43 @@ def _without_rim(truth: Bytes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     return cv2.erode(truth, disc(inside)) > 0, cv2.dilate(truth, disc(outside)) == 0
 
 
-def _drawn_views(clip: str) -> Iterator[View]:
+def _drawn_frames(clip: str) -> tuple[tuple[Camera, ...], Iterator[Sequence[View]]]:
     renderer, cameras, frame_count = person_renderer(clip)
     empty = [
         gaussian_from_frames([renderer.empty(camera, frame) for frame in range(EMPTY_FRAMES)])
         for camera in range(len(cameras))
     ]
-    for frame in evenly_spread(frame_count, FRAMES):
-        shadow = renderer.shadow(int(frame))
-        for camera, background in enumerate(empty):
-            yield (*renderer.picture(camera, int(frame), shadow), background)
+
+    def views(frame: int) -> Sequence[View]:
+        shadow = renderer.shadow(frame)
+        return [
+            (*renderer.picture(camera, frame, shadow), background) for camera, background in enumerate(empty)
+        ]
+
+    return cameras, (views(int(frame)) for frame in evenly_spread(frame_count, FRAMES))
 
 
-def _views_of_others(clip: str) -> Iterator[View]:
+def _frames_of_others(clip: str, cache: FootageCache) -> tuple[tuple[Camera, ...], Iterator[Sequence[View]]]:
     """Raises StudioError where the clip is not there."""
     folder = located(clip, real_data_folder())
-    for masks in sorted((folder / "masks_truth").iterdir()):
-        empty = _frames(folder / "background" / f"{masks.name}.mp4", EMPTY_FRAMES)
-        background = gaussian_from_frames([picture for _, picture in empty])
-        for frame, picture in _frames(folder / "videos" / f"{masks.name}.mp4", FRAMES):
-            truth = read_picture(masks / f"{frame:06d}.png")
-            yield picture, np.ascontiguousarray(truth[:, :, 0]), background
+    cameras = cache.session(str(imported(clip, cache))).cameras()
+    empty = [
+        gaussian_from_frames(
+            [picture for _, picture in _frames(folder / "background" / f"{camera.name}.mp4", EMPTY_FRAMES)]
+        )
+        for camera in cameras
+    ]
+    clips = [_frames(folder / "videos" / f"{camera.name}.mp4", FRAMES) for camera in cameras]
+
+    def views(at: int) -> Sequence[View]:
+        found: list[View] = []
+        for camera, pictures, background in zip(cameras, clips, empty, strict=True):
+            frame, picture = pictures[at]
+            truth = read_picture(folder / "masks_truth" / camera.name / f"{frame:06d}.png")
+            found.append((picture, np.ascontiguousarray(truth[:, :, 0]), background))
+        return found
+
+    return cameras, (views(at) for at in range(FRAMES))
 
 
 def _frames(video: Path, most: int) -> list[tuple[int, Bytes]]:
