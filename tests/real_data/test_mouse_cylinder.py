@@ -1,8 +1,8 @@
 """A black mouse that walks and rears in a glass cylinder, three cameras, from the videos to errors in mm (issue 29).
 
 Two frames are labelled by hand. They are no blind test: the labels showed what the hind legs of body `mouse` lack, and
-pictures of these frames were among those by which the masks and the start were judged. Sheets of all views are kept to be looked at
-(STUDIO_ARTEFACTS, default artefacts/mouse-cylinder).
+pictures of these frames were among those by which the masks and the start were judged. Sheets of all
+views are kept to be looked at (STUDIO_ARTEFACTS, default artefacts/mouse-cylinder).
 """
 
 import csv
