@@ -1,3 +1,4 @@
+# pyright: standard
 """Which pixels that look like a shadow cannot be one: the floor that they would lie on is seen empty from elsewhere.
 
 The shadow test of one camera (`background`) cannot tell a forearm on a floor of its own colour from a darker floor. The
@@ -154,7 +155,7 @@ class FloorShadows:
         if scene is None:
             return chosen
         # A calibration is not exact: beside what has changed a place is not seen unchanged.
-        near = np.concatenate([cv2.dilate(cells.kinds, np.ones((3, 3), np.uint8)).ravel() for cells in seen])
+        near = np.concatenate([_grown(cells.kinds).ravel() for cells in seen])
         explained = on_floor(near, maps, self._views, owners, rays, 0.0)
         if scene[0, 2] > 0.0:
             # The lowest of what changed is where the floor may be, give or take what no camera sees below it.
@@ -218,9 +219,15 @@ class FloorShadows:
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
+def _grown(kinds: Bytes) -> Bytes:
+    """(h, w) cells with those beside changed ones."""
+    return np.asarray(cv2.dilate(kinds, np.ones((3, 3), np.uint8)), np.uint8)
+
+
 def _drop_lesser_parts(chosen: Bytes, kinds: Bytes) -> None:
     """Clear the chosen cells (h, w) of pieces like a shadow of which they are too small a part. kinds : (h, w)."""
-    count, pieces = cv2.connectedComponents((kinds == LIKE_SHADOW).astype(np.uint8))
+    count, labelled = cv2.connectedComponents((kinds == LIKE_SHADOW).astype(np.uint8))
+    pieces = np.asarray(labelled, np.int64)
     whole = np.bincount(pieces.ravel(), minlength=count)
     part = np.bincount(pieces[chosen > 0], minlength=count)
     chosen[part[pieces] < PART * whole[pieces]] = 0
@@ -234,7 +241,7 @@ def _middle_seen(centres: Array, axes: Array) -> tuple[Array, float]:
     if np.linalg.eigvalsh(across)[0] < ALIKE:
         return np.zeros(3), np.inf
     along = np.einsum("vi,vi->v", axes, centres)[:, None] * axes
-    place = np.linalg.solve(across, (centres - along).mean(axis=0))
+    place: Array = np.linalg.solve(across, (centres - along).mean(axis=0))
     return place, float(np.median(np.linalg.norm(centres - place, axis=1)))
 
 

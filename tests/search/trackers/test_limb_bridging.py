@@ -1,5 +1,6 @@
 """Limbs that a search loses for some frames are put where the frames before and after lead."""
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 
 import numpy as np
@@ -16,7 +17,7 @@ BODY = load_body("human29")
 FPS, FRAMES = 30.0, np.arange(20)
 LOST = slice(8, 12)
 NAMES = [entry.name for entry in BODY.parameters]
-ARM = [at for at, entry in enumerate(BODY.parameters) if entry.limb == "left arm"]
+Shown = Callable[[int], Mapping[str, SilhouetteDistances]]
 
 
 @pytest.fixture(scope="module")
@@ -29,15 +30,17 @@ def waving() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def shown(waving: np.ndarray):
+def shown(waving: np.ndarray) -> Shown:
     @cache
-    def silhouettes_of(frame: int) -> dict[str, SilhouetteDistances]:
+    def silhouettes_of(frame: int) -> Mapping[str, SilhouetteDistances]:
         return silhouettes_by_camera(drawn_evidence(BODY, waving[frame], CAMERAS), 150)
 
     return silhouettes_of
 
 
-def bridged(poses: np.ndarray, shown, named=None) -> tuple[np.ndarray, tuple[Bridge, ...]]:
+def bridged(
+    poses: np.ndarray, shown: Shown, named: Sequence[Sequence[str]] | None = None
+) -> tuple[np.ndarray, tuple[Bridge, ...]]:
     return with_limbs_bridged(BODY, CAMERAS, FRAMES, poses, named or [()] * len(poses), FPS, shown)
 
 
@@ -52,13 +55,13 @@ def lost(waving: np.ndarray) -> np.ndarray:
     return planted
 
 
-def test_a_sound_clip_is_unchanged(waving: np.ndarray, shown) -> None:
+def test_a_sound_clip_is_unchanged(waving: np.ndarray, shown: Shown) -> None:
     found, bridges = bridged(waving, shown)
     assert bridges == ()
     assert np.array_equal(found, waving)
 
 
-def test_an_arm_that_jumps_away_and_back_is_bridged(waving: np.ndarray, shown) -> None:
+def test_an_arm_that_jumps_away_and_back_is_bridged(waving: np.ndarray, shown: Shown) -> None:
     planted = lost(waving)
     assert off(planted, waving) > 300.0
     found, (bridge,) = bridged(planted, shown)
@@ -72,7 +75,9 @@ def test_an_arm_that_jumps_away_and_back_is_bridged(waving: np.ndarray, shown) -
     assert np.array_equal(found[outside], planted[outside])
 
 
-def test_a_limb_that_drifts_away_is_bridged_where_the_tracker_names_it(waving: np.ndarray, shown) -> None:
+def test_a_limb_that_drifts_away_is_bridged_where_the_tracker_names_it(
+    waving: np.ndarray, shown: Shown
+) -> None:
     """It does not jump, but comes back from where it went."""
     planted, swing = waving.copy(), NAMES.index("left_shoulder_swing")
     planted[4:14, swing] -= np.radians((4.0, 8.0, 12.0, 16.0, 20.0, 20.0, 16.0, 12.0, 8.0, 4.0))
@@ -88,7 +93,7 @@ def test_what_the_pictures_show_is_not_bridged(waving: np.ndarray) -> None:
     moved = lost(waving)
 
     @cache
-    def silhouettes_of(frame: int) -> dict[str, SilhouetteDistances]:
+    def silhouettes_of(frame: int) -> Mapping[str, SilhouetteDistances]:
         return silhouettes_by_camera(drawn_evidence(BODY, moved[frame], CAMERAS), 150)
 
     found, bridges = bridged(moved, silhouettes_of)
@@ -96,7 +101,7 @@ def test_what_the_pictures_show_is_not_bridged(waving: np.ndarray) -> None:
     assert np.array_equal(found, moved)
 
 
-def test_a_limb_that_is_lost_to_the_end_stays(waving: np.ndarray, shown) -> None:
+def test_a_limb_that_is_lost_to_the_end_stays(waving: np.ndarray, shown: Shown) -> None:
     """Nothing behind it says where it went."""
     planted = waving.copy()
     planted[15:, NAMES.index("left_shoulder_swing")] = np.radians(-60.0)
