@@ -35,6 +35,7 @@ const FIRST = [
   "mask_shadow_darkest",
   "mask_shadow_colour",
   "mask_shadow_window",
+  "mask_shadow_floor",
   "mask_opening",
   "mask_closing",
   "mask_keep_components",
