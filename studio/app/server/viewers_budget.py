@@ -2,7 +2,7 @@
 
 Of requests that compute (the measure of masks, views of a search, a run as one page) one of all viewers' is worked on
 at a time; while a run is tracked it is followed by a rest of `REST` times as long, so that viewers together take a
-twelfth of the time. Of pictures `PICTURES_AT_ONCE` are drawn at a time, and of sockets there are `MOST_SOCKETS`. What
+ninth of the time. Of pictures `PICTURES_AT_ONCE` are drawn at a time, and of sockets there are `MOST_SOCKETS`. What
 cannot be served within `PATIENCE_SECONDS` is refused.
 """
 
@@ -22,7 +22,7 @@ COMPUTED = re.compile(
     r"|/views/[a-z-]+$"
 )
 PICTURE = re.compile(r"\.(jpg|png)$")
-REST, PICTURES_AT_ONCE, MOST_SOCKETS = 11.0, 2, 64
+REST, PICTURES_AT_ONCE, MOST_SOCKETS = 8.0, 2, 64
 LONGEST_REST_SECONDS, PATIENCE_SECONDS = 60.0, 30.0
 
 
