@@ -141,15 +141,9 @@ class FloorShadows:
         kinds = [cells.kinds.ravel() for cells in seen]
         chosen = [np.zeros_like(cells.kinds) for cells in seen]
         like = [np.flatnonzero(own == LIKE_SHADOW) for own in kinds]
-        owners = np.repeat(np.arange(len(seen)), [len(own) for own in like])
+        owners, rays = self._rays_through(seen, like)
         if not len(owners):
             return chosen
-        rays = np.concatenate(
-            [
-                self._rays(number, *cells.kinds.shape, cells.size)[like[number]]
-                for number, cells in enumerate(seen)
-            ]
-        )
         everything, maps = np.concatenate(kinds), _maps(seen)
         scene, least = self._scene(everything, seen, maps), min(SEEING, len(seen) - 1)
         if scene is None:
@@ -180,13 +174,7 @@ class FloorShadows:
         changed = [np.flatnonzero(cells.kinds) for cells in seen]
         stride = 1 + sum(map(len, changed)) // SAMPLED
         changed = [own[::stride] for own in changed]
-        rays = np.concatenate(
-            [
-                self._rays(number, *cells.kinds.shape, cells.size)[own]
-                for number, (cells, own) in enumerate(zip(seen, changed, strict=True))
-            ]
-        )
-        owners = np.repeat(np.arange(len(seen)), [len(own) for own in changed])
+        owners, rays = self._rays_through(seen, changed)
         reach = FARTHEST * self._distance
         anywhere = np.array([[-reach, -reach, 0.0], [reach, reach, reach]]) + self._middle * (1.0, 1.0, 0.0)
         places = lowest_changed(
@@ -208,6 +196,16 @@ class FloorShadows:
         lowest = float(np.quantile(places[:, 2], LOWER))
         box[0, 2] = lowest if lowest > ABOVE * self._distance else 0.0
         return box
+
+    def _rays_through(
+        self, seen: Sequence[Cells], chosen: Sequence[NDArray[np.int64]]
+    ) -> tuple[NDArray[np.int64], Array]:
+        """(K,) numbers of the cameras and (K, 3) directions of some cells. chosen : of each camera."""
+        rays = [
+            self._rays(number, *cells.kinds.shape, cells.size)[own]
+            for number, (cells, own) in enumerate(zip(seen, chosen, strict=True))
+        ]
+        return np.repeat(np.arange(len(seen)), [len(own) for own in chosen]), np.concatenate(rays)
 
     def _rays_of(self, number: int, high: int, wide: int, size: int) -> Array:
         """(h * w, 3) directions of unit length through a camera's cells."""

@@ -357,7 +357,7 @@ def drawn_along(
 
 def _joints_of(body: BodyModel, own: Sequence[int]) -> list[list[int]]:
     """The angles `own` by the joint that they turn, parents first."""
-    turned = [[step.parameter for step in joint.steps if step.parameter in own] for joint in body.joints]
+    turned = [[angle for angle in joint.parameters if angle in own] for joint in body.joints]
     return [angles for angles in turned if angles]
 
 

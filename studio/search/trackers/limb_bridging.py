@@ -103,10 +103,8 @@ class _Work:
         self._cameras, self._silhouettes_of = {camera.name: camera for camera in cameras}, silhouettes_of
         self._seen = functools.lru_cache(KEPT_SILHOUETTES)(self._seen_in)
         self._refiners: dict[tuple[str, ...], Refiner] = {}
-        self._own = {
-            limb: bent_by(Refiner(body, tuple(cameras), RefinementSettings()), limb)
-            for limb in dict.fromkeys(self._names.tolist())
-        }
+        refiner = Refiner(body, tuple(cameras), RefinementSettings())
+        self._own = {limb: bent_by(refiner, limb) for limb in dict.fromkeys(self._names.tolist())}
 
     def stretches(self, limb: str, lost: NDArray[np.bool_]) -> list[tuple[int, int]]:
         """Rows from, and after, between which a limb is doubtful. lost : (K,) whether the tracker named it."""
@@ -124,7 +122,7 @@ class _Work:
 
     def bridge(self, limb: str, first: int, after: int) -> None:
         """Put a limb where the best path of a stretch leads, from whichever margin gains most."""
-        best, most = None, LEAST_GAIN
+        best, most, usual = None, LEAST_GAIN, self._usual(limb)
         for before in MARGINS:
             for behind in MARGINS:
                 begin, end = first - before, after - 1 + behind
@@ -132,7 +130,7 @@ class _Work:
                     continue
                 if np.diff(self._frames[begin : end + 1]).max() > 1:
                     continue
-                path, gained = self._path(limb, begin, end)
+                path, gained = self._path(limb, begin, end, usual)
                 if gained > most:
                     best, most = (begin, path), gained
         if best is None:
@@ -142,8 +140,8 @@ class _Work:
         self.poses[begin : begin + len(path)] = path
         self.bridges.append(Bridge(int(self._frames[changed[0]]), int(self._frames[changed[-1]]), limb))
 
-    def _path(self, limb: str, begin: int, end: int) -> tuple[Array, float]:
-        """The poses of rows `begin` to `end`, both of which stay, on the best path, and what it gains."""
+    def _path(self, limb: str, begin: int, end: int, usual: float) -> tuple[Array, float]:
+        """The poses of rows `begin` to `end`, both of which stay, on the best path, and what it gains. usual : σ."""
         offers = self._offers(limb, begin, end)
         losses = np.array(
             [[self._loss(begin + row, pose) for pose in some] for row, some in enumerate(offers)]
@@ -152,15 +150,12 @@ class _Work:
         known = np.where(losses > 0.0, losses, 1.0)
         own = share * np.log(known / known[:, :1])
         ends = self._ends(limb, offers.reshape(-1, offers.shape[2])).reshape(*offers.shape[:2], -1, 3)
-        apart = np.sqrt(np.square(ends - ends[:, :1]).sum(axis=3).mean(axis=2))
         # What hardly differs from what was tracked is the same place, refined further.
-        own[:, 1:][apart[:, 1:] < NEAR_MM] = np.inf
-        usual = self._usual(limb)
+        own[:, 1:][moved(ends[:, 1:], ends[:, :1]) < NEAR_MM] = np.inf
         cost, came = own[0], np.zeros(own.shape, np.int64)
         straight = 0.0
         for row in range(1, len(offers)):
-            apart = np.sqrt(np.square(ends[row][None] - ends[row - 1][:, None]).sum(axis=3).mean(axis=2))
-            motion = MOTION * np.log1p((apart / usual) ** 2)
+            motion = MOTION * np.log1p((moved(ends[row][None], ends[row - 1][:, None]) / usual) ** 2)
             straight += float(motion[0, 0])
             ways = cost[:, None] + motion
             came[row] = np.argmin(ways, axis=0)

@@ -384,5 +384,5 @@ def best_path(gains: Array, movements: Array) -> tuple[NDArray[np.bool_], float]
 
 
 def moved(after: Array, before: Array) -> Array:
-    """(K,) root mean square distance of points (K, P, 3)."""
-    return np.sqrt(np.square(after - before).sum(axis=2).mean(axis=1))
+    """(...) root mean square distance of points (..., P, 3)."""
+    return np.sqrt(np.square(after - before).sum(axis=-1).mean(axis=-1))
