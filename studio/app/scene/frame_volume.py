@@ -5,9 +5,7 @@ hull, with the blobs fitted from the shown result and the memory that came into 
 with the default knobs of that likelihood.
 """
 
-import contextlib
 import dataclasses
-import os
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -21,8 +19,8 @@ from studio.evidence.volume.blob_model import BlobMixture, BlobModel
 from studio.evidence.volume.hull import Hull
 from studio.foundations.arrays import Array
 from studio.foundations.errors import StudioError
+from studio.foundations.low_priority import step_back
 from studio.foundations.memory import give_back_freed_memory
-from studio.foundations.numba_in_threads import numba
 from studio.runs.problem_source import ProblemSource
 from studio.search.likelihood.blob_settings import BlobSettings
 from studio.search.likelihood.blobs import BlobFrameLikelihood, blob_mixture
@@ -35,7 +33,6 @@ REST_SECONDS = 20.0
 """Footage and background models are released after so many seconds without a request."""
 LEAST_PAUSE_SECONDS, LONGEST_PAUSE_SECONDS = 0.05, 0.5
 """Pause between two frames in times of the last one's duration, so that at most half a core is used."""
-NICENESS = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +110,7 @@ class FrameVolumes:
         return _Request(key, frame, chosen, pose.copy(), memory)
 
     def _work(self) -> None:
-        _step_back()
+        step_back()
         problems: ProblemSource | None = None
         try:
             while not self._stopping.is_set():
@@ -171,11 +168,3 @@ def _carving(settings: RunSettings) -> RunSettings:
     return dataclasses.replace(
         default_settings(settings.tracker_name, BLOBS), evidence=settings.evidence, recovery=settings.recovery
     )
-
-
-def _step_back() -> None:
-    """Limit this thread to one core at low priority."""
-    numba.set_num_threads(1)
-    if hasattr(os, "setpriority"):
-        with contextlib.suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)

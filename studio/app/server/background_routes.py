@@ -18,6 +18,7 @@ from studio.app.server.session_routes import OpenSession
 from studio.app.server.upload_routes import forget, upload_folder
 from studio.foundations.errors import FootageError, RunError, StudioError
 from studio.foundations.knobs import Value
+from studio.foundations.low_priority import at_low_priority
 from studio.foundations.records import extended
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.masks import (
@@ -84,9 +85,10 @@ Frames = Annotated[list[int] | None, Query(max_length=24, description="Empty: fi
 async def quality(session: OpenSession, frames: Frames = None, settings: Knobs = "") -> MaskQuality:
     """How far the views agree in the visual hull; `settings` as a preview of other knobs. Takes seconds a frame."""
     knobs = knob_changes(settings)
-    return await asyncio.to_thread(
+    looked = at_low_priority(
         mask_quality, session, tuple(frames or ()), knobs=knobs, keep=False, progress=False
     )
+    return await asyncio.wrap_future(looked)
 
 
 @router.post("/masks/quality")
@@ -130,7 +132,7 @@ def background(session: OpenSession, app: App) -> BackgroundAnswer:
 @router.get("/subjects")
 async def subjects(session: OpenSession, frame: Annotated[int, Query(ge=0)] = 0) -> SubjectsInView:
     """Who is in view in a frame, by the masks' hull. One can be chosen: `subject_at` of `POST …/background`."""
-    return await asyncio.to_thread(subjects_in_view, session, frame)
+    return await asyncio.wrap_future(at_low_priority(subjects_in_view, session, frame))
 
 
 @router.post("/backgrounds")

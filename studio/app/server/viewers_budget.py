@@ -2,8 +2,9 @@
 
 Of requests that compute (the measure of masks, views of a search, a run as one page) one of all viewers' is worked on
 at a time; while a run is tracked it is followed by a rest of `REST` times as long, so that viewers together take a
-ninth of the time. Of pictures `PICTURES_AT_ONCE` are drawn at a time, and of sockets there are `MOST_SOCKETS`. What
-cannot be served within `PATIENCE_SECONDS` is refused.
+ninth of the time. Measures of masks, which take longest, step back besides (`foundations.low_priority`). Of pictures
+`PICTURES_AT_ONCE` are drawn at a time, and of sockets there are `MOST_SOCKETS`. What cannot be served within
+`PATIENCE_SECONDS` is refused.
 """
 
 import asyncio
