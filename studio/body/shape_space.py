@@ -86,22 +86,22 @@ def shape_space(
     body: BodyModel,
     *,
     symmetric: bool = True,
-    lengths: bool | Literal["ends"] = True,
+    lengths: bool | Literal["untaped"] = True,
     radii: bool = True,
     flesh: bool = False,
 ) -> ShapeSpace:
     """The shape space of a body read from a file.
 
     symmetric : left and right are one group. lengths, radii, flesh : what may change (flesh: ratios and offsets);
-    "ends": only lengths that cannot be taped (`end_lengths`). Lengths and radii that are zero (absent limbs) stay so.
-    Raises BodyError where nothing can change.
+    "untaped": of the lengths only those that no tape measures (`untaped_lengths`). Lengths and radii that are zero
+    (absent limbs) stay so. Raises BodyError where nothing can change.
     """
     kinds = dimension_kinds(body.definition) if body.definition else {}
-    ends = end_lengths(body)
+    untaped = untaped_lengths(body)
     chosen = {"length": bool(lengths), "radius": radii, "ratio": flesh, "offset": flesh}
     by_size: dict[tuple[str, Kind], list[str]] = {}
     for name, kind in kinds.items():
-        if lengths == "ends" and kind == "length" and name not in ends:
+        if lengths == "untaped" and kind == "length" and name not in untaped:
             continue
         if chosen[kind] and (body.dimensions[name] > 0.0 or kind == "offset") and name not in SMALL:
             by_size.setdefault((_group_name(name, symmetric), kind), []).append(name)
@@ -139,12 +139,19 @@ def dimension_kinds(definition: BodyDefinition) -> dict[str, Kind]:
     return kinds
 
 
-def end_lengths(body: BodyModel) -> frozenset[str]:
-    """Lengths of limbs at the ends of the body: hands, feet, head."""
+def untaped_lengths(body: BodyModel) -> frozenset[str]:
+    """Lengths of limbs that no tape measures: at the ends of the body (hands, feet, head), and along the trunk where it
+    is no share of a person's height, as in an animal's fur.
+    """
     if body.definition is None:
         return frozenset()
-    limbs = zip(body.definition.limbs, ends_of(body, body.limbs), strict=True)
-    return frozenset({_name(limb.length) for limb, is_end in limbs if is_end} & body.dimensions.keys())
+    dimensions = body.definition.dimensions
+    names = set[str]()
+    for limb, is_end in zip(body.definition.limbs, ends_of(body, body.limbs), strict=True):
+        entry = dimensions.get(_name(limb.length))
+        if entry is not None and (is_end or (limb.part == "trunk" and entry.of_height is None)):
+            names.add(_name(limb.length))
+    return frozenset(names)
 
 
 def _spread(body: BodyModel, name: str, kind: Kind) -> float:

@@ -6,7 +6,7 @@ import pytest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.model import extremities
-from studio.body.shape_space import OFFSET_SIGMA, end_lengths, levelled, shape_space
+from studio.body.shape_space import OFFSET_SIGMA, levelled, shape_space, untaped_lengths
 from studio.foundations.errors import BodyError
 
 
@@ -63,12 +63,18 @@ def test_flesh_may_lie_either_side_of_the_bone() -> None:
 )
 def test_a_trunk_whose_flesh_lies_beside_the_bone_is_no_end(body: str, inner: set[str]) -> None:
     model = load_body(body)
-    ends = end_lengths(model)
-    assert "head_length" in ends
-    assert not ends & inner
+    untaped = untaped_lengths(model)
+    assert "head_length" in untaped
+    assert not untaped & inner
     assert not {"thorax", "pelvis", "chest", "loin"} & {
         model.drawn[index].name for index in extremities(model)
     }
+
+
+def test_no_tape_measures_an_animals_trunk() -> None:
+    trunk = {"rump_length", "seat_length", "loin_length", "chest_length"}
+    assert trunk | {"head_length", "ear_length"} <= untaped_lengths(load_body("mouse"))
+    assert not {"tail_length", "tail_2_length"} & untaped_lengths(load_body("mouse"))
 
 
 def test_absent_limbs_stay_absent() -> None:

@@ -11,7 +11,7 @@ from moving_bodies import standing
 
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
-from studio.body.shape_space import dimension_kinds, end_lengths
+from studio.body.shape_space import dimension_kinds, untaped_lengths
 from studio.body.subject import Subject, fit_subject
 from studio.evidence.settings import EvidenceSettings
 from studio.runs.new_run import prepare_run
@@ -20,6 +20,7 @@ from studio.runs.setup import shape_on_the_way
 from studio.runs.setup.shape_on_the_way import FOLDER, shaped_body
 from studio.runs.setup.workflow import run_changes
 from studio.search.settings import default_settings
+from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
 
 WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"
@@ -56,7 +57,7 @@ def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
         posture(0),
         default_sigma(body, 30.0),
     )
-    lengths = {name for name, kind in kinds.items() if kind == "length"} - end_lengths(body)
+    lengths = {name for name, kind in kinds.items() if kind == "length"} - untaped_lengths(body)
     assert all(found.body.dimensions[name] == body.dimensions[name] for name in lengths)
     ratios = [found.body.dimensions[name] / body.dimensions[name] for name in radii]
     assert np.mean(ratios) > 1.15
@@ -81,14 +82,24 @@ def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
     assert run_changes(walk, walk.run(first.name)) == []
 
 
+@pytest.fixture
+def bundled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RunRecord:
+    """A run of the bundled walk with the shape that comes with it: it is not fitted."""
+    shutil.copytree(WALK, tmp_path / "bundled" / "walk", ignore=shutil.ignore_patterns("runs"))
+    with monkeypatch.context() as patched:
+        patched.setattr(shape_on_the_way, "shaped_body", lambda *_, **__: pytest.fail("fitted again"))
+        return prepare_run(Session(tmp_path / "bundled" / "walk"), last=20).record
+
+
+def test_the_demo_begins_without_fitting_the_shape(bundled: RunRecord) -> None:
+    assert any("shape was fitted" in note for note in bundled.notes)
+
+
 @pytest.mark.slow
 def test_the_shape_that_comes_with_the_walk_is_the_one_that_is_fitted(
-    walk: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    walk: Session, bundled: RunRecord
 ) -> None:
     fitted = prepare_run(walk, last=20).record
-    shutil.copytree(WALK, tmp_path / "bundled" / "walk", ignore=shutil.ignore_patterns("runs"))
-    monkeypatch.setattr(shape_on_the_way, "shaped_body", lambda *_, **__: pytest.fail("fitted again"))
-    bundled = prepare_run(Session(tmp_path / "bundled" / "walk"), last=20).record
     # Thirty tracked frames lie between them: another processor's rounding moves a foot's length by 2.4 mm.
     assert bundled.dimensions == pytest.approx(fitted.dimensions, abs=5.0)
     assert bundled.start_pose == pytest.approx(fitted.start_pose, abs=5.0)

@@ -340,6 +340,7 @@ def seek(
         lambda poses: facing(body, poses),
         cameras=cameras,
         seed=seed,
+        spread=body.spread,
         effort=effort,
         progress=progress,
     )

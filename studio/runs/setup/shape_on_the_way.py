@@ -2,7 +2,7 @@
 
 Cones too thin or too thick for the clothed body shift the joints (arms ride up by centimetres), and the silhouettes
 give the ends of hands, feet and head. So before a run begins, its first frames are tracked, the shape is fitted
-to the most different of them (`search.trackers.shape_refinement`), and the run begins again with it. Bone lengths are
+to the most different of them (`search.trackers.shape_refinement`), and the run begins again with it. Other lengths are
 kept: a fit of all of them is unsafe, as silhouettes hardly separate a knee ten millimetres higher from one that is
 bent a little more (`subject_fitting` does that with more frames and priors).
 
@@ -22,7 +22,7 @@ import numpy as np
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
-from studio.body.shape_space import ShapeGroup, ShapeSpace, dimension_kinds, shape_space
+from studio.body.shape_space import ShapeGroup, ShapeSpace, dimension_kinds, shape_space, untaped_lengths
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.settings import EvidenceSettings
@@ -189,7 +189,7 @@ def fitted_shape(
     body: BodyModel, cameras: tuple[Camera, ...], frames: Sequence[FrameEvidence], poses: Array
 ) -> FittedShape:
     """The shape of a body on some frames' masks, from its poses there (F, D), which are in the right valley."""
-    space = shape_space(body, lengths="ends", flesh=True)
+    space = shape_space(body, lengths="untaped", flesh=True)
     prior = ShapePrior(space, ShapeSpreads(), None)
     borders = [silhouette_distances(frame) for frame in frames]
     fit = ShapeRefiner(ShapePrograms(space), cameras, borders, prior, lengths_known=True).refine(
@@ -235,7 +235,8 @@ def _words(shape: FittedShape, frames: range) -> str:
     listed = f": {', '.join(changed)}" if changed else ""
     return (
         f"The body's shape was fitted to frames {frames[0]} to {frames[-1]}{listed}; the silhouettes agree by "
-        f"{100.0 * shape.overlap[1]:.0f} % (before: {100.0 * shape.overlap[0]:.0f} %). Bone lengths were kept."
+        f"{100.0 * shape.overlap[1]:.0f} % (before: {100.0 * shape.overlap[0]:.0f} %). Lengths that a tape"
+        " measures were kept."
     )
 
 
@@ -249,6 +250,7 @@ def _key(session: Session, body: BodyModel, settings: RunSettings, start: Array,
         digests(session, ("footage", "calibration", "masks")),
         body.name,
         {name: round(value, KEY_DIGITS) for name, value in body.dimensions.items()},
+        sorted(untaped_lengths(body)),
         {name: value for name, value in evidence.items() if name.startswith("mask_") or value != usual[name]},
         (np.round(start, KEY_DIGITS) + 0.0).tolist(),  # no negative zero
         (frames.start, frames.stop),

@@ -24,7 +24,15 @@ import numpy as np
 from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError
 from studio.search.trackers.start_candidates import StartCandidates
-from studio.search.trackers.start_lines import OPPOSITE_LINES, AtEase, Line, LineSteps, Round, limited
+from studio.search.trackers.start_lines import (
+    MARGIN_SCALE,
+    OPPOSITE_LINES,
+    AtEase,
+    Line,
+    LineSteps,
+    Round,
+    limited,
+)
 from studio.search.trackers.tracker import FrameLikelihood, SearchSpace
 
 PER_FAMILY = 200
@@ -33,8 +41,6 @@ SURVIVING = 20
 FAMILY_LAYERS, FAMILY_PARTICLES, FAMILY_SPREAD = 8, 100, 0.6
 RANGE_SHARE, MOVE, TURN = 0.15, 80.0, 0.25
 """Initial noise: a share of a joint's range; mm (of a person) and radians of the root."""
-MARGIN_SCALE = 0.03
-"""Log weight a camera by which the right facing usually wins (see `facing_odds`)."""
 THREADS = 2
 KEY = 0x57A27
 """Key of this search's random numbers."""
@@ -87,9 +93,9 @@ class FoundStart:
 class StartSearch:
     """One search. Call `run`.
 
-    rest : (D,) the body's rest pose. facing : poses (N, D) to unit vectors (N, 3), where they face. cameras : views in
-    the problem. seed : the same one gives the same pose, on any number of threads. progress : called with steps done
-    and in all; it may raise to end the search.
+    rest : (D,) the body's rest pose. spread : (D,) usual deviations from it, inf where none is known. facing : poses
+    (N, D) to unit vectors (N, 3), where they face. cameras : views in the problem. seed : the same one gives the same
+    pose, on any number of threads. progress : called with steps done and in all; it may raise to end the search.
     """
 
     def __init__(
@@ -101,13 +107,14 @@ class StartSearch:
         *,
         cameras: int,
         seed: int,
+        spread: Array | None = None,
         effort: Effort = THOROUGH,
         progress: Progress | None = None,
     ) -> None:
         self._facing, self._cameras, self._seed = facing, cameras, seed
         self._effort, self._progress = effort, progress
         self._noise = first_noise(space)
-        self._steps = LineSteps(AtEase.of(problem, space, rest, cameras), space, rest)
+        self._steps = LineSteps(AtEase.of(problem, space, rest, cameras, spread), space, rest)
         self._done = self._total = 0
 
     def run(self, candidates: StartCandidates, known: Array | None = None) -> FoundStart:

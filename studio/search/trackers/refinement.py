@@ -147,7 +147,7 @@ class Refiner:
         usual = np.isfinite(body.spread)
         self.stiffness[usual] = np.square(SPREAD_PULL / body.spread[usual])
         self.bounded = body.bounded_angles
-        self.stiffness[~self.bounded] = 0.0
+        self.stiffness[~(self.bounded | usual)] = 0.0
 
     def refine(
         self, pose: Array, silhouettes: Sequence[Distances], problem: FrameLikelihood | None = None

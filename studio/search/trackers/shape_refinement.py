@@ -131,8 +131,9 @@ class ShapeRefiner:
         self._shaken = np.where(body.angles, SHAKEN_POSE, SHAKEN_PLACE * scale)
         self._limits = np.stack([body.lower, body.upper])
         spread = np.where(hidden_angles(body), HIDDEN_SPREAD, ANGLE_SPREAD)
-        spread = np.where(np.isfinite(body.spread), body.spread, spread)
-        self.stiffness = np.where(body.bounded_angles, 1.0 / np.square(spread), 0.0)
+        usual = np.isfinite(body.spread)
+        spread = np.where(usual, body.spread, spread)
+        self.stiffness = np.where(body.bounded_angles | usual, 1.0 / np.square(spread), 0.0)
         self._variance = FIRST_VARIANCE
 
     def refine(

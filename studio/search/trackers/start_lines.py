@@ -34,6 +34,8 @@ MOST_TOGETHER = 7
 IMPOSSIBLE = 1e6
 OPPOSITE_LINES = 2
 """Lines that face the other way than the best one and are kept whatever they weigh."""
+MARGIN_SCALE = 0.03
+"""Log weight a camera by which the right one of two attitudes usually wins (see `initialisation.facing_odds`)."""
 COMFORT = 1.0
 """Log weight a camera of an attitude whose joints are all a whole range away from rest (`AtEase`)."""
 
@@ -71,6 +73,9 @@ class AtEase:
     Without it arms are twisted and legs crossed wherever that explains a flaw of a mask; the joints of people in
     random poses lie 0.02 to 0.05 from rest in this measure, those of wrong poses of equal weight 0.05 to 0.1.
 
+    Where a body says how far its root usually turns from rest (a mouse's roll, which no silhouette of a round trunk
+    shows), half the square of that many deviations counts, in units of `MARGIN_SCALE`.
+
     rest : (D,). scale : (D,) 1 ÷ (joints × range²), 0 for what has no limits. strength : COMFORT × cameras.
     """
 
@@ -80,11 +85,24 @@ class AtEase:
     strength: float
 
     @classmethod
-    def of(cls, problem: FrameLikelihood, space: SearchSpace, rest: Array, cameras: int) -> "AtEase":
-        """A frame's likelihood with the prior for a body's limits."""
-        bounded = limited(space) & (space.hierarchy.depth > 0)
+    def of(
+        cls,
+        problem: FrameLikelihood,
+        space: SearchSpace,
+        rest: Array,
+        cameras: int,
+        spread: Array | None = None,
+    ) -> "AtEase":
+        """A frame's likelihood with the prior for a body's limits. spread : (D,) usual deviations from rest, inf where
+        none is known.
+        """
+        root = space.hierarchy.depth == 0
+        bounded = limited(space) & ~root
         ranges = np.where(bounded, space.upper - space.lower, np.inf)
-        return cls(problem, rest, ranges**-2.0 / max(1, np.count_nonzero(bounded)), cameras * COMFORT)
+        scale = ranges**-2.0 / max(1, np.count_nonzero(bounded))
+        if spread is not None:
+            scale[root] = 0.5 * MARGIN_SCALE / COMFORT * spread[root] ** -2.0
+        return cls(problem, rest, scale, cameras * COMFORT)
 
     def penalty(self, poses: Array) -> Array:
         """(N,) penalty on the log weights of poses (N, D)."""

@@ -21,7 +21,7 @@ from studio.search.trackers.initialisation import (
     first_noise,
 )
 from studio.search.trackers.start_candidates import HEADINGS, StartCandidates, facing, start_candidates
-from studio.search.trackers.start_lines import AtEase, Line, LineSteps, Round
+from studio.search.trackers.start_lines import MARGIN_SCALE, AtEase, Line, LineSteps, Round
 from studio.search.trackers.tracker import FrameLikelihood
 
 BODY = load_body("human25")
@@ -205,6 +205,16 @@ def test_the_penalty_of_attitudes_far_from_rest() -> None:
     assert eased.log_likelihood(bent[None])[0] == pytest.approx(
         problem.log_likelihood(bent[None])[0] - expected
     )
+
+
+def test_a_root_that_usually_stays_upright_rolls_only_for_a_reason() -> None:
+    spread = np.full(len(NAMES), np.inf)
+    spread[[NAMES.index("lean_right"), NAMES.index("left_elbow")]] = np.radians(20.0)
+    eased = AtEase.of(NearMarkers(BODY.neutral), SPACE, BODY.neutral, 4, spread)
+    alike = AtEase.of(NearMarkers(BODY.neutral), SPACE, BODY.neutral, 4)
+    rolled, bent = pose_with(lean_right=40)[None], pose_with(left_elbow=60)[None]
+    assert eased.penalty(rolled)[0] == pytest.approx(4.0 * MARGIN_SCALE * 0.5 * 2.0**2)
+    assert eased.penalty(bent)[0] == alike.penalty(bent)[0]
 
 
 def test_confidence_is_one_half_without_a_margin_and_grows_with_it() -> None:

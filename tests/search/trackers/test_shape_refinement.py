@@ -12,6 +12,7 @@ from studio.foundations.arrays import Array
 from studio.results.drawing_footage.cameras import placed_camera
 from studio.search.likelihood.outlines import OutlineProjector
 from studio.search.likelihood.shape_silhouettes import ShapePrograms
+from studio.search.trackers.refinement import SPREAD_PULL, RefinementSettings, Refiner
 from studio.search.trackers.shape_prior import ShapePrior, ShapeSpreads
 from studio.search.trackers.shape_refinement import HIDDEN_SPREAD, RefinedShape, ShapeRefiner
 
@@ -130,3 +131,17 @@ def test_joints_without_cones_are_held_and_the_root_is_not(space: ShapeSpace) ->
     assert stiffness["left_clavicle_rx"] == pytest.approx(HIDDEN_SPREAD**-2)
     assert stiffness["left_knee_ry"] == pytest.approx(1.0)
     assert stiffness["pelvis_rz"] == stiffness["pelvis_x"] == 0.0
+
+
+def test_a_roll_whose_usual_deviation_is_known_is_held() -> None:
+    mouse = shape_space(load_body("mouse"), lengths="untaped")
+    refiner = ShapeRefiner(
+        ShapePrograms(mouse), CAMERAS, [], ShapePrior(mouse, ShapeSpreads(), None), lengths_known=False
+    )
+    stiffness = dict(zip([e.name for e in mouse.body.parameters], refiner.stiffness, strict=True))
+    assert stiffness["roll"] == pytest.approx(np.radians(20.0) ** -2.0)
+    assert stiffness["heading"] == stiffness["pitch"] == 0.0
+    pulls = Refiner(mouse.body, CAMERAS, RefinementSettings()).stiffness
+    assert pulls[[e.name for e in mouse.body.parameters].index("roll")] == pytest.approx(
+        (SPREAD_PULL / np.radians(20.0)) ** 2
+    )
