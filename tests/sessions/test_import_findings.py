@@ -24,6 +24,25 @@ def in_world(camera: Camera, turn: np.ndarray) -> Camera:
 
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 Z_DOWN = np.diag([1.0, -1.0, -1.0])
+SPECK = """
+title = "a speck of 10 mm"
+[[parameters]]
+name = "turn"
+kind = "angle"
+max_step = 100
+limb = "speck"
+[[joints]]
+name = "speck"
+parent = "world"
+type = "hinge"
+sequence = [{ turn = "z", by = "turn" }]
+[[limbs]]
+name = "speck"
+joint = "speck"
+length = 10
+radius_start = 2
+radius_end = 2
+"""
 
 
 @pytest.mark.parametrize(
@@ -88,6 +107,29 @@ def test_the_remedies_work(tmp_path: Path, up: str, axes: np.ndarray) -> None:
         np.testing.assert_allclose(found.rotation[:, 2], wanted.rotation[:, 2], atol=1e-9)
         assert found.quarter_turns == 0
         assert np.linalg.det(found.rotation) == pytest.approx(1.0)
+
+
+def test_a_named_unit_is_believed_and_the_doubt_is_said(tmp_path: Path) -> None:
+    source = video_source(tmp_path / "source")
+    close = (replace(camera, translation=camera.translation / 100.0) for camera in CAMERAS)
+    export_calibration(tuple(close), source / "calibration" / "Calib.toml", "aniposelib")
+    report = import_source(source, tmp_path / "made", ImportOptions(unit="mm"))
+    assert any("metres were taken for millimetres" in line for line in report.warnings)
+    for camera, wanted in zip(report.session.cameras(), CAMERAS, strict=True):
+        np.testing.assert_allclose(camera.translation, wanted.translation / 100.0, atol=1e-6)
+
+
+def test_a_small_rig_around_a_small_body_is_of_its_unit(tmp_path: Path) -> None:
+    source = video_source(tmp_path / "source")
+    close = (replace(camera, translation=camera.translation / 100.0) for camera in CAMERAS)
+    export_calibration(tuple(close), source / "calibration" / "Calib.toml", "aniposelib")
+    path = source / "calibration" / "Calib.toml"
+    path.write_text(path.read_text() + "\n[metadata.board]\nsquare_length_mm = 30.0\n")
+    (source / "subject.toml").write_text('body = "speck"\n')
+    (source / "bodies").mkdir()
+    (source / "bodies" / "speck.toml").write_text(SPECK)
+    report = import_source(source, tmp_path / "made")
+    assert not any("millimetres" in line or "unit" in line for line in report.warnings)
 
 
 @pytest.mark.parametrize(("words", "message"), [({"unit": "inch"}, "no unit"), ({"up": "w"}, "no axis")])

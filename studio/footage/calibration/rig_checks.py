@@ -258,15 +258,28 @@ def _unit(cameras: Sequence[Camera]) -> Iterator[Finding]:
     yield Finding("scale", "blocks", message, remedy)
 
 
+def distance_of_subject(cameras: Sequence[Camera]) -> float | None:
+    """mm from the cameras to the place that they look at; None where that cannot be said: cameras side by side cross
+    their axes anywhere.
+    """
+    target = common_target(tuple(cameras))
+    if target is None or looks_at_one_place(cameras):
+        return None
+    around = min(float(a.rotation[2] @ b.rotation[2]) for a in cameras for b in cameras) < SIDE_BY_SIDE
+    away = float(np.median([np.linalg.norm(camera.centre - target) for camera in cameras]))
+    return away if around else None
+
+
+def has_room(cameras: Sequence[Camera], size_mm: float) -> bool:
+    """Whether the cameras surround a body of `size_mm` (0: unknown) at a distance from which it is filmed."""
+    away = distance_of_subject(cameras)
+    return away is not None and size_mm > 0.0 and ROOM[0] * size_mm <= away <= ROOM[1] * size_mm
+
+
 def room_findings(cameras: Sequence[Camera], size_mm: float) -> tuple[Finding, ...]:
     """A rig in which a body of `size_mm` (0: unknown) has no room: another unit was meant."""
-    target = common_target(tuple(cameras))
-    if target is None or size_mm <= 0.0 or looks_at_one_place(cameras):
-        return ()
-    away = float(np.median([np.linalg.norm(camera.centre - target) for camera in cameras]))
-    # Cameras side by side cross their axes anywhere.
-    around = min(float(a.rotation[2] @ b.rotation[2]) for a in cameras for b in cameras) < SIDE_BY_SIDE
-    if not around or ROOM[0] * size_mm <= away <= ROOM[1] * size_mm:
+    away = distance_of_subject(cameras)
+    if away is None or size_mm <= 0.0 or has_room(cameras, size_mm):
         return ()
     units = {"cm": 10.0, "in": 25.4, "m": 1000.0}
     fitting = [unit for unit, factor in units.items() if ROOM[0] <= factor * away / size_mm <= FAR_ENOUGH]

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from studio.footage.calibration.checks import blocking, check_calibration
-from studio.footage.calibration.rig_checks import room_findings
+from studio.footage.calibration.rig_checks import has_room, room_findings
 from studio.footage.capture.calibration_files import UNIT_PATTERN, Calibration, read_calibration
 from studio.footage.capture.footage_source import CameraSource, FootageSource
 from studio.footage.capture.naming import CameraMatch, listed
@@ -331,12 +331,19 @@ def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> Source
 
 def _checked_rig(measured: MeasuredSource, options: ImportOptions, size_mm: float) -> MeasuredSource:
     """The plan with findings on its cameras as warnings: faults that a reprojection error cannot show.
-    size_mm : of the body.
+    size_mm : of the body. A rig around a body that has room in it is of the right unit, however small; a unit that is
+    named is believed, and doubts are warnings.
 
     Raises CalibrationError with the first finding that would make results wrong, unless `allow_inconsistent`.
     """
     cameras = tuple(entry.camera for entry in measured.cameras)
     findings = check_calibration(cameras)
+    if has_room(cameras, size_mm):
+        findings = tuple(finding for finding in findings if finding.code != "scale")
+    elif options.unit:
+        findings = tuple(
+            replace(finding, severity="warns") if finding.code == "scale" else finding for finding in findings
+        )
     if not any(finding.code == "scale" for finding in findings):
         findings = (*findings, *room_findings(cameras, size_mm))
     wrong = blocking(findings)
