@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rendered_people import Rendered, overlap, rendered_walk
 
-from studio.evidence.person_network import MODEL, PersonNetwork
+from studio.evidence.person_network import MODEL, Crop, Detection, PersonNetwork
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +39,23 @@ def test_a_person_is_found_and_cut_out(walk: Rendered, network: PersonNetwork, t
     assert mask.shape == picture.shape[:2]
     assert set(np.unique(mask)) == {0, 255}
     assert overlap(mask, true) >= 0.9
+
+
+def test_the_middles_stay_where_left_and_right_are_exchanged() -> None:
+    """The network's points of the body, from the shoulders on: left ones are odd, right ones follow."""
+    points = np.random.default_rng(0).uniform(0.0, 400.0, (39, 2))
+    mirrored = points.copy()
+    for left in range(11, 33, 2):
+        mirrored[[left, left + 1]] = points[[left + 1, left]]
+    seen, exchanged = (
+        Detection(1.0, np.ones((256, 256), np.float32), given, Crop(200.0, 200.0, 400.0)).middles()
+        for given in (points, mirrored)
+    )
+    np.testing.assert_allclose(seen, exchanged)
+    np.testing.assert_allclose(seen[0], points[0])
+    np.testing.assert_allclose(
+        seen[1:], [(points[left] + points[left + 1]) / 2.0 for left in (11, 23, 25, 27)]
+    )
 
 
 @pytest.mark.slow

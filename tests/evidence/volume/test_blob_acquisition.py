@@ -143,6 +143,15 @@ def test_frames_add_up_and_a_limb_never_seen_keeps_its_cone(body: BodyModel) -> 
     assert 0.0 < model.weight[blob] < cones.weight[hidden]
 
 
+def test_a_blob_weighs_what_is_seen_of_it(body: BodyModel) -> None:
+    seen = Profiles.none(body).with_frame(body, cone_blobs(body), hull_of(body, body.neutral), body.neutral)
+    volumes = seen.sums[:, :, 0].sum(axis=1)
+    everywhere = np.where((volumes > 0.0)[:, None, None], seen.sums, seen.sums.max(axis=0))
+    model = blobs_of(body, Profiles(everywhere, 1), 1e9)
+    volumes = everywhere[:, :, 0].sum(axis=1)
+    np.testing.assert_allclose(model.weight, volumes[model.limb] / volumes.sum(), rtol=1e-12)
+
+
 def test_nothing_learnt_is_the_cones(body: BodyModel) -> None:
     model, cones = blobs_of(body, Profiles.none(body), 12.0), cone_blobs(body)
     for name in ("limb", "offset", "eigenvalues", "colour", "weight"):
