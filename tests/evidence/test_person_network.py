@@ -58,6 +58,16 @@ def test_the_middles_stay_where_left_and_right_are_exchanged() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("shape", "seen"), [((80, 2), True), ((2, 80), True), ((80, 1), False), ((1, 80), False)]
+)
+def test_a_strip_of_a_person_is_cut_out_from_two_pixels_on(shape: tuple[int, int], seen: bool) -> None:
+    everywhere = Detection(
+        1.0, np.full((256, 256), 5.0, np.float32), np.zeros((39, 2)), Crop(40.0, 40.0, 200.0)
+    )
+    assert (everywhere.mask(np.full((*shape, 3), 90, np.uint8)) == (255 if seen else 0)).all()
+
+
 @pytest.mark.slow
 def test_nobody_is_found_in_an_empty_room(walk: Rendered, network: PersonNetwork) -> None:
     assert network.find(walk.empty[walk.cameras[2].name]) == []

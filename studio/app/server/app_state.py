@@ -1,7 +1,7 @@
 """What the routes need of the storeys below: the tracking process, the scenes, and where things lie."""
 
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,13 +14,13 @@ from studio.app.scene.window_scenes import WindowScenes
 from studio.app.server.access import VIEWING
 from studio.app.server.event_stream import EventStream
 from studio.app.server.windows import Window
-from studio.foundations.errors import RunError
 from studio.operations.calibration_proposals import Proposals
 from studio.operations.jobs.camera_service import CameraService
 from studio.operations.jobs.commands import Close
 from studio.operations.jobs.control import StudioControl
 from studio.operations.jobs.events import RunState
 from studio.operations.jobs.job_runner import JobRunner, keep_in_place
+from studio.operations.jobs.process import ProcessDiedError
 from studio.operations.kept_looks import forget_looks
 from studio.sessions.session import RUNS_NAME
 from studio.sessions.work_under_way import STATE_NAME
@@ -96,12 +96,9 @@ def release(app: AppState, session: str, run: str = "") -> None:
     state, folder = app.control.state, app.workspace.root / session
     # Else the process itself knows whether that is what it has open; a search elsewhere is not waited for.
     if state.state is not RunState.LOST and (state.session == session or not state.state.searches):
-        try:
+        # A process that died meanwhile has nothing open any more.
+        with suppress(ProcessDiedError):
             app.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
-        except RunError:
-            # A process that died meanwhile has nothing open any more.
-            if app.control.state.state is not RunState.LOST:
-                raise
     for scene in app.scenes.open_scenes().values():
         if scene.shown.session == session and (not run or scene.shown.run == run):
             scene.show_run(session if run else "")

@@ -27,7 +27,7 @@ from studio.foundations.errors import (
 from studio.foundations.knobs import Value
 from studio.operations.jobs import commands
 from studio.operations.jobs.events import Acknowledged, Event, RunState, StateChanged, nothing_open
-from studio.operations.jobs.process import LOST_HINT, SILENT_SECONDS, OwnedProcess
+from studio.operations.jobs.process import LOST_HINT, SILENT_SECONDS, OwnedProcess, ProcessDiedError
 from studio.operations.jobs.watchers import Subscription, Watchers
 from studio.sessions.workspace import Workspace
 
@@ -78,7 +78,7 @@ class StudioControl:
     def send(self, command: commands.Command) -> None:
         """Post a command; an `Acknowledged` event follows. One that names its run revives a process that was lost.
 
-        Raises RunError if the process has died.
+        Raises ProcessDiedError.
         """
         self._post(command)
 
@@ -102,7 +102,7 @@ class StudioControl:
         """Post a command and wait until it is acknowledged.
 
         Raises what the process refused it with (RunError, SettingsError, …), RunError if no answer came in
-        time.
+        time, ProcessDiedError.
         """
         answer: Future[Acknowledged] = Future()
         try:
@@ -119,7 +119,7 @@ class StudioControl:
         if event.code == DIED:
             what = f"run '{Path(command.run).name}' of " if command.run else ""
             of = f" about {what}session '{Path(command.session).name}'" if command.session else ""
-            raise RunError(f"{event.message}{of}.", event.hint)
+            raise ProcessDiedError(f"{event.message}{of}.", event.hint)
         if not event.ok:
             raise _refusal(event)
         return event

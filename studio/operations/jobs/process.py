@@ -35,6 +35,10 @@ LOST_HINT = "Resume: the run continues after its last finished frame with the sa
 logger = logging.getLogger(__name__)
 
 
+class ProcessDiedError(RunError):
+    """The tracking process is gone, and with it all that it had open."""
+
+
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
     """The process lives. at : `time.monotonic()`."""
@@ -130,12 +134,12 @@ class OwnedProcess:
         return self._child.death()
 
     def send(self, command: Command) -> None:
-        """Post a command. Raises RunError if the process is gone."""
+        """Post a command. Raises ProcessDiedError."""
         try:
             with self._sending:
                 self._child.send(command)
         except EndedError:
-            raise RunError("The tracking process has died.", LOST_HINT) from None
+            raise ProcessDiedError("The tracking process has died.", LOST_HINT) from None
 
     def end(self, patience: float) -> None:
         """Ask the process to end (patience > 0: and wait so many seconds), then make it."""

@@ -9,8 +9,9 @@ from studio.app.server.alignment_routes import ALIGNMENT, AlignmentJob
 from studio.app.server.import_routes import IMPORT, ImportState
 from studio.body.subject import DEFAULT_BODY
 from studio.foundations.errors import NotFoundError
-from studio.operations.jobs.commands import Close
+from studio.operations.jobs.commands import Close, Command
 from studio.operations.jobs.job_runner import keep_in_place
+from studio.operations.jobs.process import ProcessDiedError
 from studio.search.settings import DEFAULT_WEIGHTING
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -85,6 +86,18 @@ def test_rename_title_duplicate(studio: Studio, tracked: StoredRun) -> None:
     assert set(sessions(studio)) == {"moved", "take1-2"}
     frames = client.get("/api/sessions/take1-2/runs/first/frames").json()["frames"]
     assert [entry["frame"] for entry in frames] == [0, 1]
+
+
+def test_a_tracking_process_that_dies_just_now_holds_nothing(
+    studio: Studio, tracked: StoredRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The server has not heard of its end yet, so that it still counts as idle."""
+
+    def die(command: Command) -> None:
+        raise ProcessDiedError(f"The tracking process has died before {command}.", "Resume.")
+
+    monkeypatch.setattr(studio.control, "request", die)
+    assert studio.patch("/api/sessions/take1", {"name": "moved"}) == {"name": "moved"}
 
 
 def test_delete_goes_to_the_trash_and_comes_back(studio: Studio, tracked: StoredRun) -> None:

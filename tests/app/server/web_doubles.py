@@ -18,9 +18,9 @@ from studio.app.scene.model import LayerPlayback, LiveSearch, Selection
 from studio.app.scene.scene_pictures import Film, Report, UnseenSceneError
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Bytes
-from studio.foundations.errors import RunError
 from studio.operations.jobs.commands import ChangeSettings, Command
 from studio.operations.jobs.events import Event, RunState, StateChanged
+from studio.operations.jobs.process import ProcessDiedError
 from studio.operations.jobs.watchers import Subscription, Watchers
 from studio.sessions.workspace import Workspace
 
@@ -50,7 +50,7 @@ class RecordingControl:
     def send(self, command: Command) -> None:
         if self.state.state == "lost":
             if not command.run:
-                raise RunError("The tracking process has died.", "Resume.")
+                raise ProcessDiedError("The tracking process has died.", "Resume.")
             self.restart(resume=False)
         self.commands.append(command)
 
