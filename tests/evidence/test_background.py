@@ -214,3 +214,7 @@ def test_differences_are_those_of_every_pixel(threshold: float, noise: float) ->
     np.testing.assert_array_equal(
         GaussianBackground(mean, deviation).foreground(picture, settings).mask, expected
     )
+
+
+def test_what_never_changes_has_no_deviation() -> None:
+    assert (gaussian_from_frames([seen(ROOM, 1)] * 3).variance == 0.0).all()

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from studio.evidence.colour_fit import colour_line, fitted_line
-from studio.evidence.combined_background import AGREES, agreeing_frames, background_nearby, combine
+from studio.evidence.combined_background import (
+    AGREES,
+    Combination,
+    Origin,
+    agreeing_frames,
+    background_nearby,
+    combine,
+)
 
 HEIGHT, WIDTH, COUNT = 160, 240, 24
 
@@ -95,3 +102,48 @@ def test_counts_and_means_of_agreeing_frames_are_numpys() -> None:
     chosen = frames[inside[:, y, x], y, x].astype(float)
     assert mean[y, x] == pytest.approx(chosen.mean(axis=0), abs=1e-3)
     assert deviation[y, x] == pytest.approx(chosen.std(axis=0), abs=1e-2)
+
+
+def test_coarse_decisions_are_applied_to_the_pixels_of_their_places() -> None:
+    """Of the plate the fitted colour is taken, elsewhere the mean of the frames that agree with the plate around."""
+    rng = np.random.default_rng(6)
+    plate = rng.integers(60, 180, (16, 24, 3), dtype=np.uint8)
+    gains, offsets = np.array([1.1, 0.95, 1.0], np.float32), np.array([3.0, -4.0, 0.0], np.float32)
+    fitted = plate * gains + offsets
+    frames = np.clip(fitted + rng.integers(-3, 4, (6, 16, 24, 3)), 0, 255).astype(np.uint8)
+    frames[2, 10:] = 255  # somebody walks by
+    origin = rng.choice([Origin.AGREEING, Origin.PLATE], (4, 6)).astype(np.uint8)
+    top, selected = 4, rng.random((12, 24)) < 0.7
+    out = np.full((16, 24, 3), 7, np.uint8)
+    shares = np.ones((6, 4, 6), np.float32)
+    Combination(origin, shares, gains, offsets).fill(plate, frames[:, top:], top, selected, out)
+    for y, x in np.ndindex(16, 24):
+        if y < top or not selected[y - top, x]:
+            assert (out[y, x] == 7).all()
+        elif origin[y // 4, x // 4] == Origin.PLATE:
+            np.testing.assert_array_equal(out[y, x], np.uint8(fitted[y, x] + 0.5))
+        else:
+            around = plate[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2].reshape(-1, 3)
+            low, high = (
+                around.min(axis=0) * gains + offsets - AGREES,
+                around.max(axis=0) * gains + offsets + AGREES,
+            )
+            agreeing = ((frames[:, y, x] >= low) & (frames[:, y, x] <= high)).all(axis=1)
+            np.testing.assert_array_equal(out[y, x], np.uint8(frames[agreeing, y, x].mean(axis=0) + 0.5))
+
+
+@pytest.mark.parametrize("turns", range(4))
+def test_only_the_plates_colours_beside_a_pixel_count(turns: int) -> None:
+    """A stripe along one side of the plate, and two frames of its colour."""
+    plate = np.full((5, 5, 3), 100, np.uint8)
+    plate[0] = 200
+    plate = np.ascontiguousarray(np.rot90(plate, turns))
+    frames = np.full((6, 5, 5, 3), 100, np.uint8)
+    frames[:2] = 200
+    decisions = np.zeros((5, 5), np.uint8), np.ones((6, 5, 5), np.float32)
+    out = np.zeros((5, 5, 3), np.uint8)
+    agreeing = Combination(*decisions, np.ones(3, np.float32), np.zeros(3, np.float32))
+    agreeing.fill(plate, frames, 0, np.ones((5, 5), np.bool_), out)
+    rows = np.rot90(out, -turns)
+    assert (rows[2:] == 100).all()
+    assert (rows[1] == round((2 * 200 + 4 * 100) / 6)).all()

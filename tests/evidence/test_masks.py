@@ -8,7 +8,7 @@ import pytest
 from scipy import ndimage
 from toy_footage import looking_at
 
-from studio.evidence.masks import cleaned, reduced
+from studio.evidence.masks import cleaned, reduced, uncleaned
 from studio.evidence.settings import EvidenceSettings
 
 OFF = dataclasses.replace(
@@ -91,3 +91,12 @@ def test_a_closing_reaches_as_far_beside_the_picture_as_within(closing: int) -> 
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (closing | 1, closing | 1))
         whole = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel)
         np.testing.assert_array_equal(cleaned(mask, dataclasses.replace(OFF, mask_closing=closing)), whole)
+
+
+def test_a_mask_that_is_not_cleaned_stays_as_it_is() -> None:
+    mask = np.where(np.random.default_rng(0).random((60, 80)) < 0.3, np.uint8(255), np.uint8(0))
+    strict = EvidenceSettings(
+        mask_opening=2, mask_closing=3, mask_fill_holes=20, mask_min_component=30, mask_keep_components=1
+    )
+    assert (cleaned(mask, strict) != mask).any()
+    np.testing.assert_array_equal(cleaned(mask, uncleaned(strict)), mask)

@@ -160,6 +160,17 @@ def test_a_plate_of_nearly_the_footages_size_is_fitted() -> None:
         fitted_plate(plate, plate[:, :350], "p")
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_plate_of_another_shape_is_centred_between_bars(turned: bool) -> None:
+    plate = noisy(cv2.resize(room(), (408, 300), interpolation=cv2.INTER_CUBIC), 1)
+    if turned:
+        plate = np.ascontiguousarray(plate.transpose(1, 0, 2))
+    shrunk = cv2.resize(plate, (294, 400) if turned else (400, 294), interpolation=cv2.INTER_AREA)
+    bars = (0, 0, 3, 3) if turned else (3, 3, 0, 0)
+    barred = cv2.copyMakeBorder(shrunk, *bars, cv2.BORDER_CONSTANT)
+    np.testing.assert_array_equal(fitted_plate(plate, barred, "p"), barred)
+
+
 def test_a_hull_is_carved_from_pixels_only_where_every_camera_has_an_empty_view(footage: Footage) -> None:
     backgrounds = Backgrounds(footage)
 
