@@ -87,3 +87,10 @@ def test_what_no_limb_determines_stays_as_it_was() -> None:
 def test_a_body_without_sides_has_no_mirror() -> None:
     with pytest.raises(BodyError, match="no left and right"):
         Mirror(load_body("planar_arm4"))
+
+
+def test_what_leans_aside_leans_to_the_other_side_and_what_bends_forward_stays() -> None:
+    body = load_body("human35")
+    signs = dict(zip([entry.name for entry in body.parameters], Mirror(body).signs, strict=True))
+    about = {"heading", "lean_right", "back_side", "back_twist", "head_turn"}
+    assert {name for name, sign in signs.items() if sign < 0.0} == about

@@ -104,6 +104,7 @@ def test_a_small_leg_stands_where_scipy_puts_it(tmp_path: Path) -> None:
         ("asf", "    thigh shin\n", "", "'shin' is in only one"),
         ("asf", "order TX TY TZ RX RY RZ", "order RX RY RZ TX TY TZ", "order"),
         ("asf", "length 0.5", "length 0", "line 4"),
+        ("asf", "length 0.5", "length", "line 4"),
         ("amc", "shin 40", "shin 40 1", "'07_01.amc', line 7: bone 'shin' has 2 numbers, not 1"),
         ("amc", "shin 40\n", "", "frame 1 lacks bone 'shin'"),
         ("amc", "shin 40", "tail 40", "no turning bone 'tail'"),

@@ -146,6 +146,17 @@ def test_tables_of_other_programs(tmp_path: Path) -> None:
     assert read_truth(tsv, 60.0, 1).positions[0, 0].tolist() == [1.5, -2.5, 1700.0]
 
 
+@pytest.mark.parametrize(("word", "mm"), [("Meters", 1000.0), ("Centimeters", 10.0), ("Millimeters", 1.0)])
+def test_motives_header_names_the_unit(tmp_path: Path, word: str, mm: float) -> None:
+    path = tmp_path / "a.csv"
+    place = np.array([1.5, -2.5, 1700.0]) / mm
+    path.write_text(
+        f"Format Version,1.23,Length Units,{word}\n\n,Type{',Marker' * 3}\n,Name{',S:Head' * 3}\n,{',Position' * 3}\n"
+        f"Frame,Time (Seconds),X,Y,Z\n0,0.0,{place[0]},{place[1]},{place[2]}\n"
+    )
+    np.testing.assert_allclose(read_truth(path, 60.0, 1).positions[0, 0], place * mm)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

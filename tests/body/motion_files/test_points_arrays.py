@@ -139,3 +139,22 @@ def test_rows_without_numbers_are_counted(tmp_path: Path) -> None:
     motion = read_truth(tmp_path / "a.csv", FPS)
     assert motion.positions[:, 0].tolist() == [[1, 2, 3], [4, 5, 6]]
     assert any("counted from 0" in note for note in motion.notes)
+
+
+def test_pose_estimates_of_nwb_and_a_file_without_any(tmp_path: Path) -> None:
+    places = {name: np.arange(6.0).reshape(2, 3) + at for at, name in enumerate(("nose", "tail"))}
+    with h5py.File(tmp_path / "a.nwb", "w") as file:
+        file.create_group("acquisition")
+        estimate = file.create_group("processing/behavior/PoseEstimation")
+        estimate.attrs["neurodata_type"] = "PoseEstimation"
+        for name, values in places.items():
+            series = estimate.create_group(name)
+            series["data"], series["timestamps"] = values, np.array([0.0, 0.5])
+            series["data"].attrs["unit"] = "millimeters"
+    read = read_truth(tmp_path / "a.nwb", 2.0)
+    assert read.names == ("nose", "tail")
+    np.testing.assert_allclose(read.positions[:2], np.stack([places["nose"], places["tail"]], axis=1))
+    with h5py.File(tmp_path / "b.nwb", "w") as file:
+        file.create_group("acquisition")
+    with pytest.raises(TruthError, match=r"b\.nwb"):
+        read_truth(tmp_path / "b.nwb", 2.0)

@@ -104,3 +104,13 @@ def test_binary_rubbish_is_no_trc(tmp_path: Path) -> None:
     (tmp_path / "x.trc").write_bytes(bytes(range(256)))
     with pytest.raises(TruthError, match="is not a TRC file"):
         read_trc(tmp_path / "x.trc")
+
+
+@pytest.mark.parametrize(
+    ("kept", "words"), [(5, "0 rows"), (4, "five header lines"), (0, "five header lines")]
+)
+def test_a_file_that_ends_in_or_after_its_header_says_so(tmp_path: Path, kept: int, words: str) -> None:
+    path = written(tmp_path, rows="")
+    path.write_text("\n".join(path.read_text().split("\n")[:kept]))
+    with pytest.raises(TruthError, match=words):
+        read_trc(path)
