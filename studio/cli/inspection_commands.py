@@ -9,9 +9,20 @@ from rich.console import Console
 from rich.table import Table as Drawn
 
 from studio.cli.deriving import Call, command_of
-from studio.operations.inspecting import compare_runs, inspected, seeds, view, why, worst_frame, write_tables
+from studio.operations.inspecting import (
+    compare_runs,
+    inspected,
+    seeds,
+    split_error,
+    view,
+    why,
+    worst_frame,
+    write_tables,
+)
 from studio.results.inspection.comparing import RunsCompared
-from studio.results.inspection.tables import Cell, Table, Viewed
+from studio.results.inspection.error_parts import ErrorSplit
+from studio.results.inspection.tables import Cell, Selection, Table, Viewed
+from studio.results.inspection.views import look_over
 
 MOST_ROWS = 40
 CSV = click.option(
@@ -60,6 +71,14 @@ def seeds_command(call: Call) -> dict[str, object]:
     kept = [table for table in shown.tables if table.name in ("limbs", "seeds")]
     caption = inspected(call.given["run"]).caption(call.given["frame"])
     return _answer(kept, shown.notes, caption, None)
+
+
+@command_of(split_error, CSV)
+def split_error_command(call: Call, file: Path | None) -> dict[str, object]:
+    split: ErrorSplit = call()
+    opened = inspected(call.given["run"])
+    tables = [one for one in look_over(opened, "why", Selection()).tables if one.name == "parts"]
+    return _answer(tables, (split.words,), opened.caption(), file) | {"mean": split.mean}
 
 
 @command_of(compare_runs, CSV)

@@ -40,6 +40,7 @@ COMMANDS = {
     "view": ("inspection_commands", "operations.inspecting.view"),
     "why": ("inspection_commands", "operations.inspecting.why"),
     "seeds": ("inspection_commands", "operations.inspecting.seeds"),
+    "split-error": ("inspection_commands", "operations.inspecting.split_error"),
     "compare-runs": ("inspection_commands", "operations.inspecting.compare_runs"),
     "refine": ("result_commands", "operations.results.refine"),
     "smooth": ("result_commands", "operations.results.smooth"),

@@ -13,7 +13,9 @@ from studio.foundations.errors import RunError
 from studio.operations.opening import RunName, keeping_in_place, open_run, session_of
 from studio.operations.progress import Reporting, reporting
 from studio.results.inspection.comparing import RunsCompared, compare_stored
+from studio.results.inspection.error_parts import ErrorSplit, split_of
 from studio.results.inspection.limbs import disagreements_of, errors_of
+from studio.results.inspection.long_search import EVALUATIONS, frames_to_split, search_frames
 from studio.results.inspection.reading import InspectedRun, TriedFrame
 from studio.results.inspection.seeds import search_seeds
 from studio.results.inspection.tables import FrameFinding, Remedy, Selection, Table, View, Viewed
@@ -163,6 +165,41 @@ def seeds(
     with reporting(progress, f"{opened.session.name} / {opened.run.name}: seeds") as report:
         search_seeds(opened, frame, count, report)
     return look(opened, frame, "seeds", Selection())
+
+
+@operation
+@keeping_in_place
+def split_error(
+    run: RunName,
+    *,
+    frame: Annotated[
+        int | None,
+        Field(ge=0, le=LARGEST, description="This frame alone; default: some, evenly spread."),
+        Terminal("--frame"),
+    ] = None,
+    count: Annotated[int, Field(ge=1, le=1000, description="Number of frames, evenly spread.")] = 8,
+    evaluations: Annotated[
+        int, Field(ge=1000, le=10_000_000, description="Poses that each climb of a frame weighs.")
+    ] = EVALUATIONS,
+    again: Annotated[
+        bool, Field(description="Also search frames whose long search is kept, as after a change of masks.")
+    ] = False,
+    progress: Reporting = None,
+) -> ErrorSplit:
+    """Say whose fault the error is: the search's, the likelihood's, or the body's.
+
+    Frames are searched far longer than the run searched them, some seconds each. That is kept with the run, whose
+    result is not changed; frames that were searched as long before are not searched again. With a truth the parts are
+    in mm and add up to the error; without one only the search's part is known. Ctrl-C ends it, and frames that are
+    done are kept.
+
+    Raises RunError for a run without frames, NotFoundError for a frame that is not finished.
+    """
+    opened = inspected(run)
+    chosen = frames_to_split(opened, count) if frame is None else [frame]
+    with reporting(progress, f"{opened.session.name} / {opened.run.name}: searching for long") as report:
+        search_frames(opened, chosen, evaluations, report, again=again)
+    return split_of(opened)
 
 
 @operation

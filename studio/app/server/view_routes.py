@@ -13,7 +13,14 @@ from studio.app.server.run_routes import RUN, OpenRun
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.declaring import LARGEST
 from studio.foundations.errors import RunError
-from studio.operations.inspecting import ViewAnswer, ViewList, compare_runs, seeds, view_answer
+from studio.operations.inspecting import (
+    ViewAnswer,
+    ViewList,
+    compare_runs,
+    seeds,
+    split_error,
+    view_answer,
+)
 from studio.operations.inspecting import inspected as run_to_inspect
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.sharing import page_text
@@ -38,6 +45,23 @@ SEEDS = JobKind(
     SeedsState,
     at="/api/seeds/{identifier}",
     page="/?session={session}&run={run}&frame={frame}&panel=views&view=seeds",
+)
+
+
+class SplitState(NumberedJob):
+    """How long searches of a run's frames stand. Each that is done shows in view `why`. words : once all are done."""
+
+    run: str
+    frame: int | None
+    words: str = ""
+
+
+SPLIT = JobKind(
+    "split",
+    "long search of frames",
+    SplitState,
+    at="/api/split-error/{identifier}",
+    page="/?session={session}&run={run}&panel=why",
 )
 
 
@@ -111,6 +135,25 @@ def begin_seeds(
 
 
 add_job_routes(router, "/seeds/{identifier}", SEEDS)
+
+
+@router.post(RUN + "/split-error", status_code=202)
+def begin_split(
+    session: OpenSession,
+    run: OpenRun,
+    arguments: Annotated[Arguments, body_of(split_error, "SplitRequest")],
+    app: App,
+) -> SplitState:
+    """Begin to search frames for long. Ask for its state, or wait for `split` events."""
+
+    def work(job: Job) -> dict[str, object]:
+        return {"words": split_error(run, **arguments, progress=job.report_or_stop).words}
+
+    state = SplitState(session=session.name, run=run.name, frame=arguments.get("frame"))
+    return app.jobs.begin(SPLIT, state, work)
+
+
+add_job_routes(router, "/split-error/{identifier}", SPLIT)
 
 
 @router.get("/compared-runs")

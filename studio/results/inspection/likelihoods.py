@@ -17,6 +17,7 @@ from studio.results.inspection.tables import Row, table
 from studio.results.inspection.wanted import stop_if_left
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
+from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.problem import (
     POOLED,
     WHOLE,
@@ -25,6 +26,7 @@ from studio.search.likelihood.problem import (
     FrameLikelihood,
     Shares,
 )
+from studio.search.settings import RunSettings
 
 KEPT = 2
 """Runs whose footage, backgrounds and last frames are kept open."""
@@ -36,6 +38,7 @@ NATS_SCALE = table(
     ("level", "Level", "nats"),
     ("most", "Last colour, also beyond", "nats"),
 )
+TELLS = 0.25
 TIMES_LEVEL = 100.0
 """Times the level: where the colours of maps of log weights end."""
 
@@ -135,6 +138,13 @@ def nats_scale(run: InspectedRun) -> Row:
         beta = results.layers(frames[0])[-1].beta if frames else math.nan
     level = 10.0 ** round(-math.log10(beta)) if math.isfinite(beta) and beta > 0.0 else 1.0
     return (level, TIMES_LEVEL * level)
+
+
+def telling_nats(settings: RunSettings) -> float:
+    """By how much two log-weights must differ for one pose to be preferred: a share of the likelihood's usual spread
+    (`LossLimit`).
+    """
+    return TELLS * WEIGHTINGS[settings.weighting_name].loss.spread
 
 
 def named_pose(frame: InspectedFrame, name: str, particle: int | None, layer: int) -> Array:

@@ -12,7 +12,6 @@ from studio.results.inspection import (
     coverage,
     genealogy,
     landscape,
-    limbs,
     modes,
     over_frames,
     schedule,
@@ -61,7 +60,7 @@ _ENTRIES = {
         _Entry(modes.VIEW, modes.rows, modes.over_run),
         _Entry(seeds.VIEW, seeds.rows),
         _Entry(coverage.VIEW, coverage.of_frame, coverage.over_run),
-        _Entry(why.VIEW, why.rows, limbs.limb_rows),
+        _Entry(why.VIEW, why.rows, why.run_rows),
     )
 }
 VIEWS = {name: entry.view for name, entry in _ENTRIES.items()}

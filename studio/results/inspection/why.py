@@ -1,6 +1,8 @@
 """Why a frame failed, in words made of measurements.
 
-Said first is whether the frame fits, as the timeline and the badge have it (`verdict`), and what is compared with what.
+Said first is whose fault the error is, where the frame was searched for long (`error_parts`; that is never done while
+this is asked), then whether the frame fits, as the timeline and the badge have it (`verdict`), and what is compared
+with what.
 Then it is asked, in this order; the first that holds is the cause:
 
 1. Is any limb in the wrong place? In mm from the reference pose: the truth, else what a refinement or later track made
@@ -40,10 +42,12 @@ from studio.foundations.words import enumerated
 from studio.results.evaluation.errors import lost_mm
 from studio.results.inspection.blame import ReferencePose, explained_pose, reference_pose
 from studio.results.inspection.camera_checks import CameraFault, fault_of, view_fits
-from studio.results.inspection.likelihoods import FrameEvaluation, evaluation_of
-from studio.results.inspection.limbs import limb_shares, limbs_too_far
+from studio.results.inspection.error_parts import parts_of, split_of, words_of
+from studio.results.inspection.likelihoods import FrameEvaluation, evaluation_of, telling_nats
+from studio.results.inspection.limbs import limb_rows, limb_shares, limbs_too_far
+from studio.results.inspection.long_search import LongSearch, kept_searches, search_of
 from studio.results.inspection.modes import exchanged_in
-from studio.results.inspection.reading import InspectedFrame, no_value
+from studio.results.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.results.inspection.reference import body_points, by_limb, refined_pose, true_points
 from studio.results.inspection.retracking import Change, Retracking, more_evaluations
 from studio.results.inspection.schedule import effective_number
@@ -51,7 +55,6 @@ from studio.results.inspection.tables import FrameFinding, Remedy, Row, Selectio
 from studio.results.inspection.verdict import STATE_WORDS, Verdict, verdict, verdict_on
 from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import RAW, best_track, track_stamp
-from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import RunSettings
 from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.search.trackers.tracker import TRACKED
@@ -94,6 +97,20 @@ VIEW = View(
             of_run=True,
         ),
         table(
+            "parts",
+            "Whose fault the error is, of frames that were searched for long",
+            "frame",
+            ("error", "Error as reported", "mm"),
+            ("refinement", "Added by the refinement", "mm"),
+            ("search", "The search's part", "mm"),
+            ("likelihood", "The likelihood's part", "mm"),
+            ("body", "The body's part", "mm"),
+            ("known", "Heaviest known pose less what was found", "nats"),
+            ("truth", "Truth less what was found", "nats"),
+            ("away", "Heaviest known pose from what was found", "mm"),
+            of_run=True,
+        ),
+        table(
             "scale",
             "Colours of the map of limbs",
             ("quantity", "Quantity"),
@@ -126,8 +143,6 @@ LONGEST, LONGEST_AGO = 8, 64
 """Frames that are tracked again, and that are looked back over, at most."""
 SEEDS = (101, 202)
 SETTLING, DRAWN, KEPT_WITHIN_MM = (1.0, 0.5, 0.25), 96, 40.0
-TELLS = 0.25
-"""Share of a weighting's usual spread (`LossLimit`) by which two log-weights must differ for one to be preferred."""
 KEPT = 64
 REFINED_NOW = "a refinement on the silhouettes"
 
@@ -362,9 +377,12 @@ class Case:
         shares = self.evaluation.shares(np.stack([ours, theirs]))
         off = shares.values[0] - shares.values[1]
         view, term = np.unravel_index(int(np.argmax(off)), off.shape)
-        usual = WEIGHTINGS[self.settings.weighting_name].loss.spread
         return Preference(
-            float(off.sum()), TELLS * usual, shares.cameras[view], shares.terms[term], float(off[view, term])
+            float(off.sum()),
+            telling_nats(self.settings),
+            shares.cameras[view],
+            shares.terms[term],
+            float(off[view, term]),
         )
 
     def _settle(self, pose: Array) -> Array:
@@ -472,11 +490,12 @@ def usual_survival(settings: RunSettings) -> dict[str, Value]:
 def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables, findings and remedies of view `why`; kept for the frames that were asked for last."""
     track = selection.track if selection.track != RAW else ""
-    key = (frame.of.run.folder, frame.number, track, *_stamps(frame))
+    search = None if track else search_of(frame, kept_searches(frame.of.run))
+    key = (frame.of.run.folder, frame.number, track, search, *_stamps(frame))
     with _lock:
         if key in _known:
             return _known[key]
-    explained = _explain(Case(frame, track))
+    explained = _explain(Case(frame, track), search)
     with _lock:
         _known[key] = explained
     return explained
@@ -494,7 +513,21 @@ _lock = threading.Lock()
 _known = LRUCache[tuple[object, ...], ViewResult](KEPT)
 
 
-def _explain(case: Case) -> ViewResult:
+def run_rows(run: InspectedRun, selection: Selection) -> ViewResult:
+    """The tables of the whole run: limbs over frames, and whose fault the errors of long searched frames are."""
+    return ViewResult({**limb_rows(run, selection), "parts": part_rows(run)})
+
+
+def part_rows(run: InspectedRun) -> list[Row]:
+    """Whose fault the errors of a run are, by frame."""
+    return [
+        (one.frame, one.error_mm, one.refinement_mm, one.search_mm, one.likelihood_mm, one.body_mm, one.known_nats,
+         one.truth_nats, one.away_mm)
+        for one in split_of(run).frames
+    ]  # fmt: skip
+
+
+def _explain(case: Case, search: LongSearch | None) -> ViewResult:
     findings, remedies = [_first_finding(case)], list[Remedy]()
     fault = case.camera_fault
     if fault is not None:
@@ -509,6 +542,11 @@ def _explain(case: Case) -> ViewResult:
         remedies = [replace(one, frame=case.stretch[1]) if one.settings else one for one in remedies]
     if not case.verdict.fits and not remedies:
         remedies.append(BY_HAND)
+    if search is not None:
+        parts = parts_of(case.frame, search)
+        findings.insert(
+            0, FrameFinding(f"part of {parts.chief or 'others'}", words_of(parts), numbers=parts.numbers)
+        )
     table: list[Row] = [(one.kind, one.words, one.limb, one.layer, one.camera, one.term) for one in findings]
     return ViewResult(
         {"findings": table, "nearest": case.clouds}, (_compared_with(case),), tuple(findings), tuple(remedies)
