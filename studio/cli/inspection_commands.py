@@ -21,8 +21,7 @@ from studio.operations.inspecting import (
 )
 from studio.results.inspection.comparing import RunsCompared
 from studio.results.inspection.error_parts import ErrorSplit
-from studio.results.inspection.tables import Cell, Selection, Table, Viewed
-from studio.results.inspection.views import look_over
+from studio.results.inspection.tables import Cell, Table, Viewed
 
 MOST_ROWS = 40
 CSV = click.option(
@@ -76,9 +75,9 @@ def seeds_command(call: Call) -> dict[str, object]:
 @command_of(split_error, CSV)
 def split_error_command(call: Call, file: Path | None) -> dict[str, object]:
     split: ErrorSplit = call()
-    opened = inspected(call.given["run"])
-    tables = [one for one in look_over(opened, "why", Selection()).tables if one.name == "parts"]
-    return _answer(tables, (split.words,), opened.caption(), file) | {"mean": split.mean}
+    parts = view(call.given["run"], "why").table("parts")
+    caption = inspected(call.given["run"]).caption()
+    return _answer([parts], (split.words,), caption, file) | {"mean": split.mean}
 
 
 @command_of(compare_runs, CSV)

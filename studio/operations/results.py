@@ -30,6 +30,8 @@ from studio.results.export.exporting import ExportReport
 from studio.results.export.exporting import export_run as write_run
 from studio.results.export.formats import FORMATS, format_of_file
 from studio.results.export.options import ExportOptions
+from studio.results.inspection.error_parts import split_of
+from studio.results.inspection.reading import InspectedRun
 from studio.results.verifying import Repair, Verification, remove_left_behind, repair
 from studio.results.verifying import verify as verify_session
 from studio.runs.checking import EVERY, RunCheck, check_run
@@ -223,7 +225,10 @@ def evaluate(
     if evaluation.alignment == UNALIGNED and evaluation.mean_mm > lost_mm(stored.body()):
         meant = meant_axes(chosen.poses, chosen.frames, stored.body(), motion, stored.record.fps)
         say(progress, [meant.replace("FILE", f"'{path.name}'")] if meant else [])
-    return evaluation
+    if truth is not None:
+        return evaluation
+    split = split_of(InspectedRun(opened, stored))
+    return replace(evaluation, parts_mm=split.parts_mm, parts_frames=len(split.frames))
 
 
 @operation

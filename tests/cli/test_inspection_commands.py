@@ -57,6 +57,19 @@ def test_a_layer_is_named_as_the_tables_count_it(tmp_path: Path) -> None:
     assert "layers 1 to 3" in refused
 
 
+def test_whose_fault_the_errors_are(tmp_path: Path) -> None:
+    words = ["split-error", "toy", "one", "--count", "1", "--evaluations", "1000"]
+    told = answer_of(*words)
+    [row] = told["tables"]["parts"]
+    assert row["frame"] == 1
+    said = call(*words).output
+    assert told["notes"][0] in " ".join(said.split())
+    assert f"{row['known']:.4g}" in said
+    call(*words, "--csv", tmp_path / "parts.csv")
+    assert "known [nats]" in (tmp_path / "parts.csv").read_text()
+    assert "frame 7" in refusal_of("split-error", "toy", "one", "--frame", "7")
+
+
 def test_a_line_break_in_a_run_s_record_begins_no_cell() -> None:
     text = tables_csv([], "variance of toy / one (studio 1\r\n=cmd|' /C calc'!A0)")
     assert text.splitlines() == ["# variance of toy / one (studio 1 =cmd|' /C calc'!A0)"]

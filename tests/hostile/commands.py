@@ -66,6 +66,7 @@ OTHERS = {
     "live": "a clock",
     "record": "cameras",
     "seeds": "minutes",
+    "split-error": "minutes",
     "compare-runs": "reads as view does",
     "correct": "minutes",
     "branch": "tracks",

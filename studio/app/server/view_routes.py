@@ -145,11 +145,14 @@ def begin_split(
     app: App,
 ) -> SplitState:
     """Begin to search frames for long. Ask for its state, or wait for `split` events."""
+    frame = arguments.get("frame")
+    if frame is not None:
+        run_to_inspect(run).frame(frame)
 
     def work(job: Job) -> dict[str, object]:
         return {"words": split_error(run, **arguments, progress=job.report_or_stop).words}
 
-    state = SplitState(session=session.name, run=run.name, frame=arguments.get("frame"))
+    state = SplitState(session=session.name, run=run.name, frame=frame)
     return app.jobs.begin(SPLIT, state, work)
 
 

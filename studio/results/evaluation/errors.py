@@ -105,6 +105,9 @@ class Evaluation:
         markers, so a limb's twist about its axis shows in neither.
     mean_angle_deg, mean_direction_deg : over joints, over limbs; None without any.
     alignment : of the truth as a whole, in words.
+    parts_mm, parts_frames : of what the search found: means of the search's, the likelihood's and the body's part of
+        its error (`inspection.error_parts`), and over how many frames, those that were searched for long. Empty and 0
+        before that, and against another truth than the session's.
     """
 
     frames: tuple[int, ...]
@@ -129,6 +132,8 @@ class Evaluation:
     offsets_mm: dict[str, float] = field(default_factory=dict[str, float])
     lost_threshold_mm: float = LOST_MM
     alignment: str = UNALIGNED
+    parts_mm: dict[str, float] = field(default_factory=dict[str, float])
+    parts_frames: int = 0
 
 
 def lost_mm(body: BodyModel) -> float:

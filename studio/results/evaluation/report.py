@@ -20,6 +20,14 @@ def _constant_part(evaluation: Evaluation) -> list[str]:
     ]
 
 
+def _parts(evaluation: Evaluation) -> list[str]:
+    """A line on whose fault the error is; none where no frame was searched for long."""
+    if not evaluation.parts_mm:
+        return []
+    listed = ", ".join(f"{name} {mm:.1f}" for name, mm in evaluation.parts_mm.items())
+    return [f"whose fault it is    {listed} mm of what the search found in {evaluation.parts_frames} frames"]
+
+
 def in_words(evaluation: Evaluation) -> str:
     """The evaluation as text: every number with its alignment and threshold."""
     procrustes, threshold = evaluation.procrustes_mm, evaluation.lost_threshold_mm
@@ -33,6 +41,7 @@ def in_words(evaluation: Evaluation) -> str:
         f"root aligned         {evaluation.root_aligned_mm:.1f} mm",
         f"after Procrustes     {'-' if procrustes is None else f'{procrustes:.1f} mm'}",
         *_constant_part(evaluation),
+        *_parts(evaluation),
         f"frames with a limb lost (a marker off by more than {threshold:.0f} mm)  {evaluation.lost_frames}",
     ]
     if evaluation.lost_limbs:

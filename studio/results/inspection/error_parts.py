@@ -101,6 +101,11 @@ class ErrorSplit:
     mean: dict[str, float]
     words: str
 
+    @property
+    def parts_mm(self) -> dict[str, float]:
+        """The mean parts of search, likelihood and body; {} without a truth."""
+        return {name: self.mean[f"{name}_mm"] for name in PARTS} if self.mean else {}
+
 
 def parts_of(frame: InspectedFrame, search: LongSearch) -> ErrorParts:
     """Whose fault the error of a finished frame is, by its long search."""
@@ -115,9 +120,8 @@ def parts_of(frame: InspectedFrame, search: LongSearch) -> ErrorParts:
     if truth is not None:
 
         def off(pose: Array) -> float:
-            return float(
-                np.nanmean(np.linalg.norm(body_points(run.body, pose[None])[0] - truth.points, axis=1))
-            )
+            away: Array = np.linalg.norm(body_points(run.body, pose[None])[0] - truth.points, axis=1)
+            return float(np.nanmean(away))
 
         error, before, at_best, body = (
             off(one) for one in (result.estimate.pose, found, preferred, truth.pose)

@@ -100,14 +100,14 @@ VIEW = View(
             "parts",
             "Whose fault the error is, of frames that were searched for long",
             "frame",
-            ("error", "Error as reported", "mm"),
-            ("refinement", "Added by the refinement", "mm"),
-            ("search", "The search's part", "mm"),
-            ("likelihood", "The likelihood's part", "mm"),
-            ("body", "The body's part", "mm"),
-            ("known", "Heaviest known pose less what was found", "nats"),
-            ("truth", "Truth less what was found", "nats"),
-            ("away", "Heaviest known pose from what was found", "mm"),
+            ("error", "Error", "mm"),
+            ("refinement", "Refinement", "mm"),
+            ("search", "Search", "mm"),
+            ("likelihood", "Likelihood", "mm"),
+            ("body", "Body", "mm"),
+            ("known", "Heaviest known outweighs the found by", "nats"),
+            ("truth", "Truth outweighs it by", "nats"),
+            ("away", "From found to heaviest known", "mm"),
             of_run=True,
         ),
         table(
@@ -515,16 +515,14 @@ _known = LRUCache[tuple[object, ...], ViewResult](KEPT)
 
 def run_rows(run: InspectedRun, selection: Selection) -> ViewResult:
     """The tables of the whole run: limbs over frames, and whose fault the errors of long searched frames are."""
-    return ViewResult({**limb_rows(run, selection), "parts": part_rows(run)})
-
-
-def part_rows(run: InspectedRun) -> list[Row]:
-    """Whose fault the errors of a run are, by frame."""
-    return [
+    split = split_of(run)
+    parts: list[Row] = [
         (one.frame, one.error_mm, one.refinement_mm, one.search_mm, one.likelihood_mm, one.body_mm, one.known_nats,
          one.truth_nats, one.away_mm)
-        for one in split_of(run).frames
+        for one in split.frames
     ]  # fmt: skip
+    notes = (split.words,) if parts else ()
+    return ViewResult({**limb_rows(run, selection), "parts": parts}, notes)
 
 
 def _explain(case: Case, search: LongSearch | None) -> ViewResult:

@@ -106,6 +106,22 @@ def test_seeds_are_a_job(studio: Studio, tracked: StoredRun) -> None:
     studio.post(f"{RUN}/frames/3/seeds", {}, code=404)
 
 
+def test_whose_fault_the_errors_are_is_a_job(studio: Studio, tracked: StoredRun) -> None:
+    begun = studio.post(f"{RUN}/split-error", {"count": 1, "evaluations": 1000}, code=202)
+    address = f"/api/split-error/{begun['identifier']}"
+    until(lambda: studio.get(address)["state"] in ("done", "failed"))
+    done = studio.get(address)
+    assert (done["state"], done["frame"]) == ("done", None), done
+    told = studio.get(f"{RUN}/views/why")
+    assert told["notes"] == [done["words"]]
+    [table] = [entry for entry in told["tables"] if entry["name"] == "parts"]
+    assert [row[0] for row in table["rows"]] == [1]
+    first = studio.get(f"{RUN}/frames/1/views/why")["findings"][0]
+    assert first["kind"].startswith("part of ")
+    studio.post(f"{RUN}/split-error", {"evaluations": 10}, code=422)
+    studio.post(f"{RUN}/split-error", {"frame": 3}, code=404)
+
+
 def test_runs_are_compared(studio: Studio, session: Session, tracked: StoredRun) -> None:
     other = prepare_run(session, name="second", seed=4, knobs={"survival": 0.5}, fit_shape=False)
     told = studio.get("/api/compared-runs?run=take1/first&run=take1/second")

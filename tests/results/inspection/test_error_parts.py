@@ -14,6 +14,7 @@ from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.foundations.errors import NotFoundError, RunError
 from studio.operations.inspecting import worst_frame
+from studio.results.evaluation.report import in_words
 from studio.results.inspection import long_search
 from studio.results.inspection.error_parts import ErrorParts, split_of
 from studio.results.inspection.long_search import FILE_NAME, climb, frames_to_split, kept_searches
@@ -93,6 +94,13 @@ def test_the_parts_add_up_to_the_error_that_evaluate_measures(own: InspectedRun)
         assert parts.error_mm == pytest.approx(measured)
         assert parts.known_nats >= max(0.0, parts.truth_nats or 0.0)
         assert parts.body_mm == pytest.approx(0.0, abs=0.1)
+    measured_again = studio.evaluate(own.run, track="raw", progress=False)
+    split_again = split_of(own)
+    assert evaluation.parts_mm == {}
+    assert measured_again.parts_mm == split_again.parts_mm
+    assert measured_again.parts_mm["likelihood"] == split_again.mean["likelihood_mm"]
+    assert f"likelihood {measured_again.parts_mm['likelihood']:.1f}, body 0.0 mm" in in_words(measured_again)
+    assert studio.evaluate(own.run, truth=own.session.truth_path, progress=False).parts_mm == {}
 
 
 def test_what_a_refinement_adds_is_a_part_of_its_own(tmp_path: Path) -> None:

@@ -1,32 +1,23 @@
 // A frame searched again with other seeds, in the background; its view is drawn when they are done.
 
-import { fetchJson, post, remove, runPath } from "../api.js";
+import { post, remove, runPath } from "../api.js";
 import { dotted } from "../elements.js";
 import { isGoing, standing, timeLeft } from "../jobs.js";
-import { onEvent } from "../live.js";
 import { complain } from "../messages.js";
 import { get } from "../state.js";
-import { follow, html, signal } from "./component.js";
+import { follow, html } from "./component.js";
+import { heldJobs } from "./held_jobs.js";
 
 const USUAL = 8;
-
-/**
- * The newest state of the search of each run and frame, by which it is still seen after the page
- * was loaded again.
- * @type {import("@preact/signals").Signal<Record<string, any>>}
- */
-const jobs = signal({});
 let count = USUAL;
 const keyOf = ({ session, run, frame }) => `${session}/${run}/${frame}`;
 const here = () => keyOf({ session: get("session"), run: get("run"), frame: get("frame") });
-const keep = (job) => {
-  jobs.value = { ...jobs.value, [keyOf(job)]: job };
-};
+const held = heldJobs("seeds", keyOf);
 
 /** What starts the search, or how far it is. */
 export function SeedTools() {
   const shown = { session: follow("session"), run: follow("run"), frame: follow("frame") };
-  const job = jobs.value[keyOf(shown)];
+  const job = held.about(keyOf(shown));
   if (isGoing(job)) {
     const cancel = () => remove(`/api/seeds/${job.identifier}`).catch(complain);
     return html`<span class="hint" role="status">
@@ -66,7 +57,7 @@ async function begin() {
     // What is tried is searched as what is stored is, so that both can be drawn.
     for (const trial of [get("against"), ...(get("trial") ? [get("trial")] : [])]) {
       const path = `${runPath(get("session"), get("run"))}/frames/${get("frame")}/seeds`;
-      keep(await post(trial ? `${path}?trial=${trial}` : path, { count }));
+      held.keep(await post(trial ? `${path}?trial=${trial}` : path, { count }));
     }
   } catch (error) {
     complain(error);
@@ -75,23 +66,6 @@ async function begin() {
   }
 }
 
-/** Searches that were begun before this page was loaded, or in another window. */
-async function findSeeds() {
-  const { jobs: listed } = await fetchJson("/api/jobs?kind=seeds");
-  for (const line of listed.filter(isGoing)) {
-    keep(await fetchJson(/** @type {any} */ (line.at)));
-  }
-}
-
-/**
- * Hear of searches; `ended()` is called when that of the shown frame has ended.
- * @param {() => void} ended
- */
-export function startSeeds(ended) {
-  findSeeds().catch(complain);
-  onEvent("seeds", (job) => {
-    keep(job);
-    if (job.state === "failed") complain(job);
-    if (keyOf(job) === here() && !isGoing(job)) ended();
-  });
-}
+/** Hear of searches; `ended()` is called when that of the shown frame has ended. */
+export const startSeeds = (/** @type {() => void} */ ended) =>
+  held.start((job) => keyOf(job) === here() && ended());

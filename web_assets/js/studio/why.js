@@ -17,6 +17,7 @@ import { computed, follow, html, signal } from "./component.js";
 import { correctFrame } from "./correcting.js";
 import { FigurePlace } from "./figure_place.js";
 import { keepAsNewRun } from "./keeping.js";
+import { Split, startSplit } from "./split.js";
 import { hasTrack } from "./tracks.js";
 import { liveFigure } from "./views.js";
 
@@ -231,8 +232,8 @@ const Findings = ({ findings = [] }) => html`<ul class="why-findings">
   )}
 </ul>`;
 
-/** Why a frame is as it is. @param {{ frame: Answer, tried: Answers | null }} properties */
-function Reasons({ frame, tried }) {
+/** Why a frame is as it is. @param {Answers & { tried: Answers | null }} properties */
+function Reasons({ frame, run, tried }) {
   follow("trial");
   follow("trials");
   const { notes, findings, remedies = [] } = frame;
@@ -251,7 +252,8 @@ function Reasons({ frame, tried }) {
         <div class="remedies">
           ${remedies.map((remedy) => html`<${RemedyCard} key=${remedy.title} remedy=${remedy} />`)}
         </div>`
-    }`;
+    }
+    <${Split} words=${run.notes} />`;
 }
 
 /** The frame that is searched: its layers so far, beside what is said of it once it is finished. */
@@ -286,7 +288,7 @@ function Said() {
   }
   if (subject.value === "searched") return html`<${Searched} />`;
   const answers = followAnswers();
-  if (answers) return html`<${Reasons} frame=${answers.frame} tried=${answers.tried} />`;
+  if (answers) return html`<${Reasons} ...${answers} />`;
   return empty(wrong.value || `Frame ${follow("frame")} is being looked into ...`);
 }
 
@@ -350,5 +352,9 @@ export function startWhy() {
   watch([...names, "follow", "work", "detail"], later);
   onEvent("frame", (event, here) => {
     if (here && !event.reannealed) age += 1;
+  });
+  startSplit(() => {
+    age += 1;
+    later();
   });
 }
