@@ -775,6 +775,21 @@ def test_a_frame_s_seeds_are_searched_and_drawn(window: StudioPage, studio: Stud
     assert len(rows_of(studio, "seeds", "seeds")) >= 3
 
 
+def test_why_says_first_whose_fault_the_error_is(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.bring_to_front()
+    page.evaluate(SET, {"panel": "why", "frame": FRAME, "compared": None})
+    first = page.locator("#panel-why .why-findings li").first
+    first.wait_for()
+    assert not first.inner_text().startswith("Mostly the")
+    page.get_by_role("button", name="Search this frame for long").click()
+    until(page, lambda: first.inner_text().startswith("Mostly the"))
+    whole = page.locator("#panel-why h3", has_text="Whose fault is the error?").locator("+ p")
+    assert whole.inner_text().startswith("Mostly the ")
+    [row] = rows_of(studio, "why", "parts", run=True)
+    assert row["frame"] == FRAME
+
+
 def test_a_new_run_shows_what_it_costs_and_may_only_be_made(window: StudioPage, studio: StudioServer) -> None:
     page = window.page
     page.bring_to_front()
