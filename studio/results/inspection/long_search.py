@@ -82,7 +82,9 @@ def kept_searches(run: StoredRun) -> dict[int, LongSearch]:
 def search_of(frame: InspectedFrame, kept: dict[int, LongSearch]) -> LongSearch | None:
     """The kept long search of a frame as it is stored now; None where there is none."""
     known = kept.get(frame.number)
-    return known if known is not None and known.stamp == _stamp(frame) else None
+    if known is None or known.stamp != _stamp(frame) or len(known.pose) != len(frame.of.names):
+        return None
+    return known
 
 
 def frames_to_split(run: InspectedRun, count: int) -> list[int]:

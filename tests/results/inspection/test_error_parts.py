@@ -1,5 +1,6 @@
 """Whose fault an error is: planted faults of search, likelihood and body are each blamed rightly."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from tracked_runs import finish
 import studio
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
-from studio.foundations.errors import NotFoundError, RunError
+from studio.foundations.errors import NotFoundError, RunError, SessionError
 from studio.operations.inspecting import worst_frame
 from studio.results.evaluation.report import in_words
 from studio.results.inspection import long_search
@@ -196,6 +197,18 @@ def test_a_search_of_a_frame_that_was_tracked_again_counts_no_more(own: Inspecte
     kept.write_text(kept.read_text().replace('"frame": 3', '"frame": 2'))
     assert split_of(own).frames == ()
     assert split_of(own).words.startswith("No frame has been searched for long")
+
+
+def test_a_kept_pose_of_another_body_counts_not(own: InspectedRun) -> None:
+    split(own, FRAME)
+    kept = own.run.folder / FILE_NAME
+    record = json.loads(kept.read_text())
+    record["searches"][0]["pose"].pop()
+    kept.write_text(json.dumps(record))
+    assert split_of(own).frames == ()
+    kept.write_text("{")
+    with pytest.raises(SessionError, match="cannot be read"):
+        split_of(own)
 
 
 def test_frames_are_evenly_spread(own: InspectedRun) -> None:
