@@ -113,13 +113,13 @@ class StudioControl:
                 f"The tracking process did not answer '{type(command).__name__}'.",
                 "Wait until it has compiled, or restart it.",
             ) from None
+        except ProcessDiedError:
+            raise _died_before(command) from None
         finally:
             with self._lock:
                 self._answers.pop(command.identifier, None)
         if event.code == DIED:
-            what = f"run '{Path(command.run).name}' of " if command.run else ""
-            of = f" about {what}session '{Path(command.session).name}'" if command.session else ""
-            raise ProcessDiedError(f"{event.message}{of}.", event.hint)
+            raise _died_before(command)
         if not event.ok:
             raise _refusal(event)
         return event
@@ -250,9 +250,15 @@ class StudioControl:
 
 
 def _leave_unanswered(answers: Mapping[str, Future[Acknowledged]]) -> None:
-    text = "The tracking process died before it answered"
     for identifier, answer in answers.items():
-        answer.set_result(Acknowledged("", "", identifier, "", False, text, LOST_HINT, DIED))
+        answer.set_result(Acknowledged("", "", identifier, "", False, "", "", DIED))
+
+
+def _died_before(command: commands.Command) -> ProcessDiedError:
+    """That the process is gone and never answered this command, of which it is said what it was about."""
+    run = f"run '{Path(command.run).name}' of " if command.run else ""
+    about = f" about {run}session '{Path(command.session).name}'" if command.session else ""
+    return ProcessDiedError(f"The tracking process died before it answered{about}.", LOST_HINT)
 
 
 def _refusal(event: Acknowledged) -> StudioError:

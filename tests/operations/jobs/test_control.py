@@ -30,6 +30,7 @@ from studio.operations.jobs.events import (
     RunState,
     StateChanged,
 )
+from studio.operations.jobs.process import OwnedProcess, ProcessDiedError
 from studio.operations.jobs.watchers import Subscription
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
@@ -169,6 +170,23 @@ def test_a_command_that_the_process_dies_of_is_answered(
     with pytest.raises(RunError, match=f"^The tracking process died before it answered about {about}"):
         control.request(command)
     assert wait_for(watching, in_state("lost"))
+
+
+def test_a_command_that_can_no_longer_be_sent_says_what_it_was_about(
+    control: StudioControl, session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    control.start()
+
+    def gone(_: object, command: object) -> None:
+        raise ProcessDiedError(f"No {command} any more.", "Resume.")
+
+    monkeypatch.setattr(OwnedProcess, "send", gone)
+    command = commands.Close(session=str(session_on_disk.path), run=str(session_on_disk.path / "runs" / "a"))
+    about = f"run 'a' of session '{session_on_disk.name}'"
+    with pytest.raises(
+        ProcessDiedError, match=f"^The tracking process died before it answered about {about}"
+    ):
+        control.request(command)
 
 
 @pytest.mark.slow
