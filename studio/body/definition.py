@@ -47,6 +47,11 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     name = "LKnee"
     joint = "left_shin"
     at = [0, 0, 0]                    # mm or [-]dimension each
+
+    [[meshes]]                        # optional, made of a robot's file: surfaces whose outlines are exact
+    joint = "link_1"
+    points = "…"                      # packed (`body.meshes`)
+    triangles = "…"
 """
 
 import math
@@ -130,6 +135,14 @@ class MarkerEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     at: tuple[float | str, float | str, float | str]
 
 
+class MeshEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The surface of a link, fixed to a joint's frame. points, triangles : packed (`body.meshes`)."""
+
+    joint: str
+    points: str
+    triangles: str
+
+
 class BodyDefinition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A whole body file."""
 
@@ -141,6 +154,7 @@ class BodyDefinition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     dimensions: dict[str, DimensionEntry] = {}
     markers: tuple[MarkerEntry, ...] = ()
     shape_order: tuple[str, ...] = ()
+    meshes: tuple[MeshEntry, ...] = ()
 
 
 def split_sign(reference: str) -> tuple[float, str]:

@@ -98,6 +98,15 @@ class Marker:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LinkMesh:
+    """The surface of a link. joint : in whose frame it is fixed. points : (V, 3) mm. triangles : (F, 3) of them."""
+
+    joint: int
+    points: Array
+    triangles: Indices
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class KinematicTables:
     """The tree as flat arrays for kernels. F joints, S steps in all, L drawn limbs.
 
@@ -124,6 +133,7 @@ class BodyModel:
         from.
     definition : the body file's entries, from which a body of other dimensions is built (None: built in code, its
         dimensions cannot change).
+    meshes : surfaces of all links, whatever the dimensions are; empty where the limbs are all that is known.
     """
 
     name: str
@@ -134,6 +144,7 @@ class BodyModel:
     markers: tuple[Marker, ...]
     dimensions: dict[str, float]
     definition: BodyDefinition | None = None
+    meshes: tuple[LinkMesh, ...] = ()
 
     @property
     def drawn(self) -> tuple[Limb, ...]:

@@ -12,7 +12,8 @@ import msgspec
 import numpy as np
 
 from studio.body.definition import WORLD, BodyDefinition, JointEntry, ParameterEntry, StepEntry, split_sign
-from studio.body.model import MOVE, TURN, BodyModel, Joint, Limb, Marker, Parameter, Step
+from studio.body.meshes import mesh_of
+from studio.body.model import MOVE, TURN, BodyModel, Joint, Limb, LinkMesh, Marker, Parameter, Step
 from studio.foundations.errors import BodyError
 from studio.foundations.foreign_files import foreign_file, read_foreign_text
 from studio.foundations.typed_decoding import decode_toml, is_list
@@ -39,6 +40,7 @@ def check_definition(definition: BodyDefinition, file: str) -> None:
     check.joints()
     check.limbs()
     check.markers()
+    check.meshes()
 
 
 class _Check:
@@ -218,6 +220,16 @@ class _Check:
             for value in entry.at:
                 self.length(where, "at", value)
 
+    def meshes(self) -> None:
+        for number, entry in enumerate(self.definition.meshes, 1):
+            self.joint(f"mesh {number}", entry.joint)
+            try:
+                mesh_of(entry)
+            except ValueError as problem:
+                self.fail(
+                    f"mesh {number}", f"cannot be read: {problem}", "Make the file of the robot's again."
+                )
+
     def joint(self, where: str, name: str) -> None:
         names = [entry.name for entry in self.definition.joints]
         if name not in names:
@@ -308,6 +320,7 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
         ),
         dimensions=dict(dimensions),
         definition=definition,
+        meshes=tuple(LinkMesh(joint_index[entry.joint], *mesh_of(entry)) for entry in definition.meshes),
     )
 
 

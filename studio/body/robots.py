@@ -37,12 +37,14 @@ from studio.body.definition import (
     JointEntry,
     LimbEntry,
     MarkerEntry,
+    MeshEntry,
     ParameterEntry,
     StepEntry,
 )
+from studio.body.meshes import coarser, cone_mesh, mesh_entry
 from studio.body.model import BodyModel
 from studio.body.reader import assemble, check_definition
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, Indices
 from studio.foundations.errors import BodyError
 from studio.foundations.foreign_files import foreign_file, read_file
 from studio.foundations.isolated import isolated
@@ -58,6 +60,8 @@ LARGEST_BYTES = 32 << 20
 LONGEST_MM = 1e5
 SHORTEST_MM = 0.05
 SLICES = 24
+CUBES = 48
+"""Cubes along a mesh's longest side, of which each keeps one point."""
 ROUND_MM, ROUND_DEGREES = 7, 9
 """Decimals that are kept."""
 FREE, BALL, SLIDE, HINGE = range(4)
@@ -244,6 +248,8 @@ class _Part:
     radii: tuple[float, float]
     scales: tuple[float, float] = (1.0, 1.0)
     guessed: bool = False
+    mesh: tuple[Array, Indices] | None = None
+    """Points in the link's frame, mm, and triangles; None where the cone is all there is."""
 
 
 @dataclass(slots=True)
@@ -272,6 +278,7 @@ class _Robot:
     link: dict[int, str] = field(default_factory=dict[int, str])
     drives: dict[int, str] = field(default_factory=dict[int, str])
     thin: list[str] = field(default_factory=list[str])
+    surfaces: list[tuple[str, _Part]] = field(default_factory=list[tuple[str, _Part]])
 
     def definition(self) -> BodyDefinition:
         self._refuse_loops()
@@ -302,6 +309,7 @@ class _Robot:
             limbs=tuple(self.limbs),
             markers=tuple(self.markers),
             dimensions=self.dimensions,
+            meshes=tuple(self._meshes()),
         )
 
     # Which bodies.
@@ -497,6 +505,7 @@ class _Robot:
             parts = list(self._thin_parts(body, kept))
             self.thin += [name] if parts else []
         side = "left" if "left" in name.lower() else "right" if "right" in name.lower() else "middle"
+        self.surfaces += [(name, part) for part in parts]
         for number, part in enumerate(parts, 1):
             own = self._unique("limb", name if len(parts) == 1 else f"{name} {number}")
             joint = self._unique("joint", f"{own} part")
@@ -562,9 +571,26 @@ class _Robot:
         part = fitted_cone(points)
         if part is None:
             return None
+        faces, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        triangles = np.asarray(model.mesh_face[faces : faces + count], dtype=np.int64)
         return _Part(
-            centre + turn @ part.start, turn @ part.turn, part.length, part.radii, part.scales, guessed=True
+            centre + turn @ part.start,
+            turn @ part.turn,
+            part.length,
+            part.radii,
+            part.scales,
+            guessed=True,
+            mesh=coarser(centre + points @ turn.T, triangles, float(np.ptp(points, axis=0).max()) / CUBES),
         )
+
+    def _meshes(self) -> Iterator[MeshEntry]:
+        """The surfaces of all links, cones as well, where any is a mesh."""
+        if any(part.mesh is not None for _, part in self.surfaces):
+            for joint, part in self.surfaces:
+                points, triangles = part.mesh or cone_mesh(part.length, part.radii, part.scales)
+                if part.mesh is None:
+                    points = part.start + points @ part.turn.T
+                yield mesh_entry(joint, points, triangles)
 
     def _thin_parts(self, body: int, kept: list[int]) -> Iterator[_Part]:
         for other in kept:

@@ -10,7 +10,7 @@ from studio.body.definition import BodyDefinition
 from studio.body.model import BodyModel
 from studio.foundations.errors import BodyError
 
-GROUPS = ("parameters", "joints", "limbs", "markers")
+GROUPS = ("parameters", "joints", "limbs", "markers", "meshes")
 
 
 def body_text(body: BodyModel) -> str:

@@ -191,7 +191,7 @@ def prepare_run(
             *contrast_notes(session, settings.evidence, KnownPoses(tree, {first: start}, source)),
         )
     before = dict(tree.dimensions)
-    if fit_shape and not live and start is not None:
+    if fit_shape and not live and start is not None and not tree.meshes:
         tree, start, words = fit_session_shape(session, tree, settings, start, first, progress)
         notes = (*notes, *([words] if words else []))
     record = RunRecord(

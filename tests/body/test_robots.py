@@ -287,6 +287,14 @@ def test_a_mesh_beside_the_file_is_found(tmp_path: Path) -> None:
     text = GRIPPER.replace('<sphere radius="0.02"/>', mesh)
     body = load_body(str(written(tmp_path / "robot" / "urdf", "gripper.urdf", text)))
     limb = next(limb for limb in body.limbs if limb.name == "right_finger")
+    mesh = next(one for one in body.meshes if body.joints[one.joint].name == "right_finger")
+    assert sorted(np.ptp(mesh.points, axis=0)) == pytest.approx([100.0, 100.0, 400.0], abs=1e-3)
+    assert len(mesh.triangles) == 12
+    assert {body.joints[one.joint].name for one in body.meshes} >= {
+        "base-link".replace("-", "_"),
+        "right_finger",
+    }
+    assert not load_body(str(written(tmp_path, "without.urdf", GRIPPER))).meshes
     assert limb.length == pytest.approx(400.0, rel=1e-3)
     assert limb.radius_start == pytest.approx(100.0 / np.sqrt(np.pi), rel=0.05)
     ends = limb_ends(body, np.array([[0.0, 0.25]]))[0]

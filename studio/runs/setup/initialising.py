@@ -30,11 +30,13 @@ from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.problem_source import ProblemSource, check_seen
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.setup.initial_limbs import limbs_put_right
+from studio.runs.setup.mesh_start import EFFORT, outlines_put_right
 from studio.runs.setup.person_facing import NETWORK_ODDS, facing_agreement
 from studio.runs.setup.session_settings import session_settings
 from studio.search.behaviour.model_file import read_model
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.edge_region import CPU
+from studio.search.likelihood.mesh_silhouettes import MeshSilhouettes
 from studio.search.settings import DEFAULT_TRACKER, RunSettings, changed_settings
 from studio.search.trackers.frame_refinement import Hypothesis, has_tail
 from studio.search.trackers.initialisation import (
@@ -156,7 +158,11 @@ def initialise(
     check_seen(session, masks)
     hull, box, note = hull_of(tree, cameras, masks)
     space = search_space(tree, session_sigma(session, tree, session.manifest.fps))
-    problem = whole_problem(tree, cameras, settings, evidence)
+    problem = (
+        MeshSilhouettes(tree, cameras, masks)
+        if tree.meshes
+        else whole_problem(tree, cameras, settings, evidence)
+    )
     start = seek(
         problem,
         space,
@@ -165,6 +171,7 @@ def initialise(
         box,
         cameras=len(cameras),
         seed=seed,
+        effort=EFFORT if tree.meshes else THOROUGH,
         prototypes=prototypes,
         progress=lambda done, total: progress("searching for the pose", done, total),
     )
@@ -174,7 +181,11 @@ def initialise(
     if start.margin < 0.0:
         note = f"{note} {TURNED}".strip()
     draw = len(cameras) >= FEWEST_VIEWS
-    stands = limbs_put_right(tree, cameras, masks, start.pose, seed, draw=draw)
+    stands = (
+        outlines_put_right(tree, cameras, masks, start.pose, seed, progress)
+        if tree.meshes
+        else limbs_put_right(tree, cameras, masks, start.pose, seed, draw=draw)
+    )
     if tailed and start.rival is not None:
         other = limbs_put_right(tree, cameras, masks, start.rival, seed, draw=draw)
         start, stands = better_facing(problem, len(cameras), start, stands, other)

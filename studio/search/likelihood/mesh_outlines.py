@@ -1,0 +1,109 @@
+"""Silhouettes and outlines of a body whose links have meshes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import joint_frames
+from studio.body.meshes import coarser
+from studio.body.model import BodyModel
+from studio.evidence.distance_maps import distances_of
+from studio.foundations.arrays import Array, Bytes, Indices
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.camera_table import camera_table, outward_limit
+from studio.foundations.geometry.projection import project
+from studio.search.likelihood.mesh_kernels import draw_triangles, project_points
+
+MOST_POINTS = 3000
+"""Of an outline in a view."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshOutline:
+    """One view's outline. border : (K, 2) pixels. outward : (K, 2) unit vectors. joint : (K,) that each point moves
+    with. own : (K, 3) points in that joint's frame, mm.
+    """
+
+    border: Array
+    outward: Array
+    joint: Indices
+    own: Array
+
+
+class MeshOutlines:
+    """Draws one body with meshes into some cameras; immutable."""
+
+    def __init__(self, body: BodyModel, cameras: Sequence[Camera]) -> None:
+        self.body, self.cameras = body, tuple(cameras)
+        self.points, self.triangles, self.joints = all_meshes(body)
+        self._table = camera_table(self.cameras, outward_limit)
+
+    def silhouettes(self, pose: Array) -> tuple[Bytes, ...]:
+        """By camera (H, W), 0 or 255, of a pose (D,)."""
+        frames = joint_frames(self.body, pose)[0]
+        return tuple(_mask(self._drawn(frames, view)[0]) for view in range(len(self.cameras)))
+
+    def of(self, pose: Array) -> tuple[MeshOutline, ...]:
+        """The outlines of a pose (D,), by camera."""
+        frames = joint_frames(self.body, pose)[0]
+        return tuple(self._outline(frames, view) for view in range(len(self.cameras)))
+
+    def slopes(
+        self, pose: Array, view: int, outline: MeshOutline, rows: Indices, differences: Array
+    ) -> Array:
+        """(K, D) pixels by which points `rows` (K,) of an outline move outwards per unit of each parameter.
+        differences : (D,) half the step.
+        """
+        size = len(pose)
+        steps = np.concatenate([np.diag(differences), -np.diag(differences)])
+        frames = joint_frames(self.body, pose + steps)[:, outline.joint[rows]]
+        moved = np.einsum("nkij,kj->nki", frames[..., :3], outline.own[rows]) + frames[..., 3]
+        pixels = project(self.cameras[view], moved)[0]
+        change = (pixels[:size] - pixels[size:]) / (2.0 * differences)[:, None, None]
+        return np.einsum("dki,ki->kd", np.nan_to_num(change), outline.outward[rows])
+
+    def _drawn(self, frames: Array, view: int) -> tuple[Indices, NDArray[np.float32]]:
+        camera = self.cameras[view]
+        seen = np.empty((len(self.points), 3))
+        project_points(self.points, frames, self.joints, self._table[view], 1.0, seen)
+        owner = np.empty((camera.height, camera.width), dtype=np.int64)
+        depth = np.empty((camera.height, camera.width), dtype=np.float32)
+        draw_triangles(seen, self.triangles, owner, depth)
+        return owner, depth
+
+    def _outline(self, frames: Array, view: int) -> MeshOutline:
+        camera, (owner, depth) = self.cameras[view], self._drawn(frames, view)
+        line = distances_of(_mask(owner), MOST_POINTS, exact=False)
+        if not len(line.border):
+            return MeshOutline(line.border, line.outward, np.zeros(0, np.int64), np.zeros((0, 3)))
+        x, y = line.border.astype(np.int64).T
+        joint = self.joints[self.triangles[owner[y, x], 0]]
+        away = depth[y, x].astype(np.float64)
+        flat = cv2.undistortPoints(line.border[:, None], camera.matrix, camera.distortion)
+        rays = np.column_stack([flat.reshape(-1, 2), np.ones(len(line.border))])
+        world = (rays * away[:, None] - camera.translation) @ camera.rotation
+        own = np.einsum("kji,kj->ki", frames[joint][:, :, :3], world - frames[joint][:, :, 3])
+        return MeshOutline(line.border, line.outward, joint, own)
+
+
+def all_meshes(body: BodyModel, share: float = 0.0) -> tuple[Array, Indices, Indices]:
+    """Points (V, 3) in their joints' frames, triangles (F, 3), and the points' joints (V,) of all links. share : of its
+    longest side that a mesh's points are put together over, 0 to keep them all.
+    """
+    points, triangles, joints, count = list[Array](), list[Indices](), list[Indices](), 0
+    for mesh in body.meshes:
+        own, faces = mesh.points, mesh.triangles
+        if share:
+            own, faces = coarser(own, faces, max(share * float(np.ptp(own, axis=0).max()), 1e-3))
+        points.append(own)
+        triangles.append(faces + count)
+        joints.append(np.full(len(own), mesh.joint, dtype=np.int64))
+        count += len(own)
+    return np.concatenate(points), np.concatenate(triangles), np.concatenate(joints)
+
+
+def _mask(owner: Indices) -> Bytes:
+    return np.where(owner >= 0, np.uint8(255), np.uint8(0))
