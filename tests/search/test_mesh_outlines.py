@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from toy_footage import rig
 
-from studio.body.definition import BodyDefinition, JointEntry, LimbEntry, ParameterEntry, StepEntry
+from studio.body.definition import BodyDefinition, JointEntry, LimbEntry, MeshEntry, ParameterEntry, StepEntry
 from studio.body.forward_kinematics import joint_frames
 from studio.body.meshes import cone_mesh, mesh_entry
 from studio.body.model import BodyModel
@@ -16,6 +16,7 @@ from studio.evidence.distance_maps import distances_of
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BodyError
+from studio.foundations.progress import no_progress
 from studio.runs.setup.mesh_start import outlines_put_right, twins
 from studio.search.likelihood.mesh_outlines import MeshOutlines
 from studio.search.likelihood.mesh_silhouettes import MeshSilhouettes
@@ -32,7 +33,8 @@ TRUE = np.radians([25.0, -50.0, 40.0])
 
 def arm(axes: str = "yxy") -> BodyModel:
     """Three links with a crossbar each, which no cone around them shows."""
-    parameters, joints, limbs, meshes = [], [], [], []
+    parameters, joints = list[ParameterEntry](), list[JointEntry]()
+    limbs, meshes = list[LimbEntry](), list[MeshEntry]()
     parent, steps = "world", (StepEntry(300.0, move="z"),)
     for number, axis in enumerate(axes, 1):
         name, turn = f"link_{number}", f"A{number}"
@@ -55,7 +57,7 @@ def body() -> BodyModel:
 
 @pytest.fixture(scope="module")
 def evidence(body: BodyModel) -> FrameEvidence:
-    views = []
+    views = list[ViewEvidence]()
     for camera, mask in zip(CAMERAS, MeshOutlines(body, CAMERAS).silhouettes(TRUE), strict=True):
         picture = np.zeros((*mask.shape, 3), np.uint8)
         views.append(ViewEvidence(camera.name, picture, mask, np.zeros_like(mask)))
@@ -113,7 +115,7 @@ def test_the_right_pose_weighs_most(body: BodyModel, evidence: FrameEvidence) ->
 
 def test_a_wrong_end_of_a_chain_is_drawn_again(body: BodyModel, evidence: FrameEvidence) -> None:
     start = TRUE + np.radians([0.0, 90.0, -120.0])
-    stands = outlines_put_right(body, CAMERAS, evidence, start, 0, lambda *_: None)
+    stands = outlines_put_right(body, CAMERAS, evidence, start, 0, no_progress)
     assert off(stands.pose) < 0.4
 
 
