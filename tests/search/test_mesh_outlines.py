@@ -87,7 +87,7 @@ def test_a_damaged_mesh_is_named(body: BodyModel) -> None:
 def test_an_outline_moves_as_its_slopes_say(body: BodyModel) -> None:
     outlines = MeshOutlines(body, CAMERAS)
     there = outlines.of(TRUE)[0]
-    rows = np.arange(0, len(there.border), 20)
+    rows = np.arange(len(there.border))
     slopes = outlines.slopes(TRUE, 0, there, rows, np.full(3, 1e-3))
     turned = TRUE + np.radians([0.0, 0.0, 3.0])
     moved = outlines.of(turned)[0]
@@ -96,7 +96,7 @@ def test_an_outline_moves_as_its_slopes_say(body: BodyModel) -> None:
         [np.min(np.linalg.norm(moved.border - there.border[row] - change * there.outward[row], axis=1))
          for row, change in zip(rows, expected, strict=True)]
     )  # fmt: skip
-    assert np.abs(expected).max() > 4.0
+    assert np.abs(expected).max() > 3.5
     assert np.median(near) < 1.0
 
 

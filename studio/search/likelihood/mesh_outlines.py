@@ -3,22 +3,27 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from studio.body.forward_kinematics import joint_frames
 from studio.body.meshes import coarser
 from studio.body.model import BodyModel
-from studio.evidence.distance_maps import distances_of
-from studio.foundations.arrays import Array, Bytes, Indices
+from studio.foundations.arrays import Array, Bytes, Indices, Mask
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.camera_table import camera_table, outward_limit
-from studio.foundations.geometry.projection import project
+from studio.foundations.geometry.projection import distorted, project
 from studio.search.likelihood.mesh_kernels import draw_triangles, project_points
 
 MOST_POINTS = 3000
 """Of an outline in a view."""
+SMOOTHED = 1.5
+"""Standard deviation, pixels, of the smoothing before an outline's direction is measured."""
+BEYOND = 4
+"""Pixels around a silhouette that its smoothing reaches."""
+ROUNDS = 10
+"""In which a lens's distortion is taken from pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +49,10 @@ class MeshOutlines:
     def silhouettes(self, pose: Array) -> tuple[Bytes, ...]:
         """By camera (H, W), 0 or 255, of a pose (D,)."""
         frames = joint_frames(self.body, pose)[0]
-        return tuple(_mask(self._drawn(frames, view)[0]) for view in range(len(self.cameras)))
+        return tuple(
+            np.where(self._drawn(frames, view)[0] >= 0, np.uint8(255), np.uint8(0))
+            for view in range(len(self.cameras))
+        )
 
     def of(self, pose: Array) -> tuple[MeshOutline, ...]:
         """The outlines of a pose (D,), by camera."""
@@ -76,17 +84,15 @@ class MeshOutlines:
 
     def _outline(self, frames: Array, view: int) -> MeshOutline:
         camera, (owner, depth) = self.cameras[view], self._drawn(frames, view)
-        line = distances_of(_mask(owner), MOST_POINTS, exact=False)
-        if not len(line.border):
-            return MeshOutline(line.border, line.outward, np.zeros(0, np.int64), np.zeros((0, 3)))
-        x, y = line.border.astype(np.int64).T
+        border, outward = _border_of(owner >= 0)
+        if not len(border):
+            return MeshOutline(border, outward, np.zeros(0, np.int64), np.zeros((0, 3)))
+        x, y = border.astype(np.int64).T
         joint = self.joints[self.triangles[owner[y, x], 0]]
         away = depth[y, x].astype(np.float64)
-        flat = cv2.undistortPoints(line.border[:, None], camera.matrix, camera.distortion)
-        rays = np.column_stack([flat.reshape(-1, 2), np.ones(len(line.border))])
-        world = (rays * away[:, None] - camera.translation) @ camera.rotation
+        world = (_rays(camera, border) * away[:, None] - camera.translation) @ camera.rotation
         own = np.einsum("kji,kj->ki", frames[joint][:, :, :3], world - frames[joint][:, :, 3])
-        return MeshOutline(line.border, line.outward, joint, own)
+        return MeshOutline(border, outward, joint, own)
 
 
 def all_meshes(body: BodyModel, share: float = 0.0) -> tuple[Array, Indices, Indices]:
@@ -105,5 +111,31 @@ def all_meshes(body: BodyModel, share: float = 0.0) -> tuple[Array, Indices, Ind
     return np.concatenate(points), np.concatenate(triangles), np.concatenate(joints)
 
 
-def _mask(owner: Indices) -> Bytes:
-    return np.where(owner >= 0, np.uint8(255), np.uint8(0))
+def _border_of(inside: Mask) -> tuple[Array, Array]:
+    """(K, 2) pixels (x, y) of a silhouette (H, W) beside others, at most MOST_POINTS, none at the picture's own
+    border, and (K, 2) unit vectors away from it.
+    """
+    rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+    if not len(rows):
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    top, left = max(int(rows[0]) - BEYOND, 0), max(int(columns[0]) - BEYOND, 0)
+    part = inside[top : rows[-1] + BEYOND + 1, left : columns[-1] + BEYOND + 1]
+    amid = part[1:-1, 1:-1]
+    surrounded = part[:-2, 1:-1] & part[2:, 1:-1] & part[1:-1, :-2] & part[1:-1, 2:]
+    y, x = np.nonzero(amid & ~surrounded)
+    step = max(1, -(-len(x) // MOST_POINTS))
+    x, y = x[::step] + 1, y[::step] + 1
+    smooth = ndimage.gaussian_filter(part.astype(np.float32), SMOOTHED)
+    inwards = np.stack([smooth[y, x + 1] - smooth[y, x - 1], smooth[y + 1, x] - smooth[y - 1, x]], axis=1)
+    lengths = np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), 1e-9)
+    return np.stack([x + left, y + top], axis=1).astype(np.float64), -inwards.astype(np.float64) / lengths
+
+
+def _rays(camera: Camera, pixels: Array) -> Array:
+    """(K, 3) directions through pixels (K, 2), in the camera's frame, of depth 1."""
+    seen = np.linalg.solve(camera.matrix, np.column_stack([pixels, np.ones(len(pixels))]).T)[:2]
+    flat = seen.copy()
+    for _ in range(ROUNDS):
+        x, y, _ = distorted(flat[0], flat[1], camera.distortion)
+        flat += seen - np.stack([x, y])
+    return np.column_stack([*flat, np.ones(len(pixels))])

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 
 from studio.body.forward_kinematics import joint_frames
@@ -66,5 +65,5 @@ def _shrink(mask: Mask) -> int:
 def _shrunk(mask: Mask, factor: int) -> Floats:
     """(H, W) shares of a mask's pixels; what is left at its right and below is dropped."""
     height, width = mask.shape[0] // factor, mask.shape[1] // factor
-    part = mask[: height * factor, : width * factor].astype(np.float32)
-    return np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA), dtype=np.float32)
+    cells = mask[: height * factor, : width * factor].reshape(height, factor, width, factor)
+    return cells.mean(axis=(1, 3), dtype=np.float32)
