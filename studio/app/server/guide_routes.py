@@ -132,10 +132,10 @@ def rendered(name: str, title: str, in_course: bool = False) -> dict[str, str]:
     if in_course:
         contents += [_course_link(page, name) for page in COURSE]
     for opening, inline in itertools.pairwise(tokens):
-        if opening.type == "heading_open" and opening.tag == "h2":
+        if opening.type == "heading_open" and opening.tag in ("h2", "h3"):
             anchor = anchor_of(inline.content)
             opening.attrSet("id", anchor)
-            if not in_course:
+            if opening.tag == "h2" and not in_course:
                 contents.append(f'<a href="#{anchor}">{html.escape(inline.content)}</a>')
     # Lines within a table's cell are the one thing that the text cannot say without HTML.
     content = markdown.renderer.render(tokens, markdown.options, {}).replace("&lt;br&gt;", "<br>")
