@@ -8,7 +8,7 @@ import numpy as np
 from studio.foundations.arrays import Array, Floats, Indices
 from studio.foundations.geometry.camera_table import CameraTable
 from studio.foundations.geometry.projection import distorted
-from studio.foundations.numba_in_threads import EXACT, njit
+from studio.foundations.numba_in_threads import EXACT, EXACT_INLINED, njit
 
 NEAREST_DEPTH = 1.0
 EDGE = -1e-9
@@ -61,6 +61,14 @@ def box_of_triangle(a, b, c, width, height):
     return int(left), int(top), int(right) + 1, int(bottom) + 1
 
 
+@njit(**EXACT_INLINED)
+def shares_of_corners(a, b, c, area, x, y):
+    """Barycentric coordinates of a pixel's centre in a triangle of twice the signed `area`."""
+    u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
+    v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
+    return u, v, 1.0 - u - v
+
+
 @njit(**EXACT)
 def draw_triangles(seen: Array, triangles: Indices, owner: Indices, depth: Floats) -> None:
     """Fill owner (H, W), the nearest triangle (F, 3) of points (V, 3: pixel and depth) at each pixel's centre, -1 where
@@ -79,9 +87,7 @@ def draw_triangles(seen: Array, triangles: Indices, owner: Indices, depth: Float
             continue
         for y in range(top, bottom):
             for x in range(left, right):
-                u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
-                v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
-                w = 1.0 - u - v
+                u, v, w = shares_of_corners(a, b, c, area, x, y)
                 if u >= EDGE and v >= EDGE and w >= EDGE:
                     here = np.float32(1.0 / (u / a[2] + v / b[2] + w / c[2]))
                     if here < depth[y, x]:
@@ -128,9 +134,8 @@ def compare_silhouettes(
                         at = start + y * width + x
                         if stamp[at] == n:
                             continue
-                        u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
-                        w = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
-                        if u >= EDGE and w >= EDGE and 1.0 - u - w >= EDGE:
+                        u, v, w = shares_of_corners(a, b, c, area, x, y)
+                        if u >= EDGE and v >= EDGE and w >= EDGE:
                             stamp[at] = n
             for at in range(start, start + height * width):
                 share += 1.0 - masks[at] if stamp[at] == n else masks[at]
