@@ -14,6 +14,7 @@ evidence.json                knobs of `evidence.settings` that new runs of the s
 
 import contextlib
 import dataclasses
+import os
 import shutil
 from collections.abc import Generator, Iterable, Mapping
 from pathlib import Path
@@ -33,7 +34,7 @@ from studio.sessions import atomic_files
 from studio.sessions.names import free_name, name_from
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session, redescribe
-from studio.sessions.work_under_way import one_at_a_time
+from studio.sessions.work_under_way import one_at_a_time, work_of_others
 
 EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
 ANIMAL_MASKS, PERSON_MASKS, STROKE_MASKS, CHOSEN_MASKS, SUBJECT_MASKS = HOMES = (
@@ -225,14 +226,19 @@ def made_masks(session: Session, home: str) -> Generator[MadeMasks]:
 
     Earlier ones stay until `forget_unused_masks`. Raises SessionError.
     """
-    numbers = [int(path.name) for path in made_folders(session, home)]
-    place = f"{home}/{max(numbers, default=0) + 1}"
-    with atomic_files.made_whole(session.path / place, parents=False) as folder:
+    with one_at_a_time(session.path):
+        folder = atomic_files.new_folder_beside(session.path / home / "1", parents=False)
+    try:
         made = MadeMasks(session, folder)
         yield made
-    with one_at_a_time(session.path):
-        change_evidence(session, given_masks=given_masks_of(session))
-    use_masks(session, made.names(place))
+        with one_at_a_time(session.path):
+            numbers = [int(path.name) for path in made_folders(session, home)]
+            place = f"{home}/{max(numbers, default=0) + 1}"
+            atomic_files.move_into_place(folder, session.path / place)
+            change_evidence(session, given_masks=given_masks_of(session))
+            use_masks(session, made.names(place))
+    finally:
+        atomic_files.discard(folder)
 
 
 def given_masks_of(session: Session) -> dict[str, str]:
@@ -274,20 +280,25 @@ def use_given_masks(session: Session) -> Session:
 
 
 def forget_unused_masks(session: Session) -> None:
-    """Remove the studio's own masks that no camera refers to any more, and unfinished ones. The newest masks from
-    strokes stay, since later strokes change only part of them.
+    """Remove the studio's own masks that no camera refers to any more, and unfinished ones; none while others are at
+    work in the session, who may be making or trying them. The newest masks from strokes stay, since later strokes
+    change only part of them.
     """
-    cameras = session.manifest.footage.cameras
-    used = {Path(*Path(source.masks).parts[:2]) for source in cameras if has_made_masks(source)}
-    of_strokes = made_folders(session, STROKE_MASKS)
-    if of_strokes and not any(place.parts[0] == STROKE_MASKS for place in used):
-        used.add(of_strokes[-1].relative_to(session.path))
-    for home in HOMES:
-        for path in list((session.path / home).glob("*")):
-            if path.relative_to(session.path) not in used:
-                shutil.rmtree(path, ignore_errors=True)
-        with contextlib.suppress(OSError):
-            (session.path / home).rmdir()
+    with one_at_a_time(session.path):
+        # A job's process works for the server, which says so, too.
+        if any(work.process != str(os.getppid()) for work in work_of_others(session.path)):
+            return
+        cameras = Session(session.path).manifest.footage.cameras
+        used = {Path(*Path(source.masks).parts[:2]) for source in cameras if has_made_masks(source)}
+        of_strokes = made_folders(session, STROKE_MASKS)
+        if of_strokes and not any(place.parts[0] == STROKE_MASKS for place in used):
+            used.add(of_strokes[-1].relative_to(session.path))
+        for home in HOMES:
+            for path in list((session.path / home).glob("*")):
+                if path.relative_to(session.path) not in used:
+                    shutil.rmtree(path, ignore_errors=True)
+            with contextlib.suppress(OSError):
+                (session.path / home).rmdir()
 
 
 def use_masks(session: Session, names: Mapping[str, str]) -> Session:

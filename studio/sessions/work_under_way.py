@@ -145,13 +145,17 @@ def gone(what: str) -> NotFoundError:
 
 def check_alone(session: Path) -> None:
     """Raise RunError where anything but this thread's own work goes on in a session: it may be reading the footage."""
+    for work in work_of_others(session):
+        raise RunError(
+            f"Session '{session.name}' keeps its footage while {work.in_words()}.",
+            "Wait for it, or end it.",
+        )
+
+
+def work_of_others(session: Path) -> Iterator[Work]:
+    """The work in a session but this thread's own."""
     own: set[Path] = _mine.__dict__.get("work", set())
-    for path, work in _at_work(session):
-        if path not in own:
-            raise RunError(
-                f"Session '{session.name}' keeps its footage while {work.in_words()}.",
-                "Wait for it, or end it.",
-            )
+    return (work for path, work in _at_work(session) if path not in own)
 
 
 def under_way(session: Path) -> Iterator[Work]:

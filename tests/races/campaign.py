@@ -266,7 +266,7 @@ def _misleading(given: Given, fired: Sequence[str], outcomes: Sequence[Outcome])
             yield f"{verb} is refused and names nothing: {outcome.words}"
         if CAUSELESS.search(outcome.words):
             yield f"{verb} is refused with a false cause: {outcome.words}"
-        gone = outcome.words.startswith("There is no session")
+        gone = outcome.words.startswith("There is no session") or "renamed or deleted" in outcome.words
         if plain(verb) == "make a run" and "name" in outcome.words and not gone:
             yield f"{verb} is refused for a name that nobody gave: {outcome.words}"
 

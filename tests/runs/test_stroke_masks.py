@@ -1,6 +1,8 @@
 """Masks of anything from brush strokes: carried both ways, corrected later, kept as files, refused when wrong."""
 
 import json
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -19,7 +21,7 @@ from studio.foundations.errors import FootageError, NotFoundError, SessionError,
 from studio.runs.setup.background_setup import set_up_background
 from studio.runs.setup.stroke_masks import kept_frames, preview_mask
 from studio.sessions import stroke_files
-from studio.sessions.background_files import forget_unused_masks
+from studio.sessions.background_files import STROKE_MASKS, forget_unused_masks, made_masks
 from studio.sessions.footage_changes import change_footage
 from studio.sessions.session import Session
 from studio.sessions.stroke_files import (
@@ -139,6 +141,40 @@ def test_masks_made_of_strokes_stay_while_another_source_is_used(ball: PatchedBa
     forget_unused_masks(now)
     assert made_of_strokes(now) is not None
     assert set_up_background(now, "strokes", tune=False).notes[0].startswith("The strokes are as they were")
+
+
+def test_masks_that_others_are_making_stay(ball: PatchedBall, tmp_path: Path) -> None:
+    """Their folder is unfinished, or its masks are not in use yet; who is alone removes what nobody uses."""
+    set_up_background(ball.session, "strokes", strokes=ball.strokes(1), tune=False)
+    session = Session(ball.session.path)
+    with made_masks(session, STROKE_MASKS) as made:
+        unused = made.folder.with_name("7")
+        unused.mkdir()
+        other = subprocess.Popen(
+            [sys.executable, "-c", AT_WORK, str(session.path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        assert other.stdin is not None
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"at work\n"
+        set_up_background(Session(session.path), "threshold", tune=False)
+        assert made.folder.is_dir()
+        assert unused.is_dir()
+        other.communicate(b"end\n")
+        assert other.returncode == 0
+    now = Session(session.path)
+    assert (now.path / now.manifest.footage.cameras[0].masks).is_dir()
+    forget_unused_masks(now)
+    assert not unused.exists()
+
+
+AT_WORK = """
+import sys
+from pathlib import Path
+from studio.sessions.work_under_way import working_on
+with working_on(Path(sys.argv[1]), "background"):
+    print("at work", flush=True)
+    sys.stdin.readline()
+"""
 
 
 @pytest.mark.parametrize(
