@@ -104,10 +104,11 @@ def kept_rows(log_weights: Array, wanted: int) -> Indices:
 LAYER_COUNTS = ("frame", "layer", "settings_version")
 LAYER_NUMBERS = (
     *LAYER_COUNTS, "beta", "alpha_wanted", "alpha_reached", "best_log_weight", "milliseconds", "model_free_share",
+    "temper", "acceptance", "log_evidence",
 )  # fmt: skip
 LAYER_VECTORS = ("variance_weighed", "variance_resampled", "variance_diffused", "best", "mean")
 """Fields of a layer's record in the order in which they are stored; layers that were stored before there were behaviour
-models have one number less.
+models or sampled posteriors have fewer numbers.
 """
 
 

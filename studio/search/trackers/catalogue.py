@@ -9,6 +9,7 @@ from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilt
 from studio.search.trackers.behaviour_guided import BehaviourGuided
 from studio.search.trackers.condensation import Condensation
 from studio.search.trackers.particle_swarm import ParticleSwarm
+from studio.search.trackers.tempered import TemperedFilter
 from studio.search.trackers.tracker import AnyTracker, Preset, Tracker
 
 NEEDED_KNOBS = ("start_repeats",)
@@ -26,7 +27,7 @@ TRACKERS: Registry[AnyTracker] = Registry(
     "tracker",
     "studio.trackers",
     Tracker,
-    (AnnealedParticleFilter(), BehaviourGuided(), Condensation(), ParticleSwarm()),
+    (AnnealedParticleFilter(), BehaviourGuided(), Condensation(), ParticleSwarm(), TemperedFilter()),
     _check,
 )
 

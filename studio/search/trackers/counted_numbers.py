@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.numba_in_threads import EXACT, EXACT_INLINED, njit
 
-OF_RUN, OF_PARENTS, OF_CUTS, OF_NOISE = 0, 1, 2, 16
+OF_RUN, OF_PARENTS, OF_CUTS, OF_MOVES, OF_KINDS, OF_NOISE = 0, 1, 2, 3, 4, 16
 """Which of a particle's words are meant; the run's own are those of particle 0."""
 OF_VELOCITIES, OF_TRIES, OF_TRY = 1 << 12, 1 << 16, 1 << 12
 """Likewise of a sampled swarm's velocities; of the tries of a step, the first of them and how many a try has."""

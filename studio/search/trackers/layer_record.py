@@ -8,7 +8,7 @@ import numpy as np
 from studio.foundations.arrays import Array, Indices
 from studio.search.trackers.annealing import Annealed
 from studio.search.trackers.particle_kernels import moments
-from studio.search.trackers.particles import weighted_mean
+from studio.search.trackers.particles import heaviest, weighted_mean
 from studio.search.trackers.tracker import LayerRecord, ParticleSet
 
 
@@ -28,7 +28,7 @@ def layer_record(
     free : share of the particles that no behaviour model moved.
     parents : as in the record; None: nothing was drawn.
     """
-    best = int(np.argmax(weighted.log_weights))
+    best = heaviest(weighted)
     return LayerRecord(
         layer=layer,
         beta=annealed.beta,

@@ -149,9 +149,15 @@ def weighted_variance(particles: ParticleSet) -> Array:
     return np.exp(particles.log_weights) @ (particles.poses - weighted_mean(particles)) ** 2
 
 
+def heaviest(particles: ParticleSet) -> int:
+    """Number of the particle that weighs most; among equal ones, as in a sample of a posterior, by the likelihood."""
+    most = particles.log_weights == np.max(particles.log_weights)
+    return int(np.argmax(np.where(most, particles.raw_log_weights, -np.inf)))
+
+
 def estimate(particles: ParticleSet, kind: str) -> Estimate:
     """The reported pose of a weighted set: its "mean" (Eq. 8) or its "mode" (Eq. 2)."""
-    best = int(np.argmax(particles.log_weights))
+    best = heaviest(particles)
     mean, mode = weighted_mean(particles), particles.poses[best]
     pose = mean if kind == "mean" else mode
     return Estimate(pose, mean, mode, float(particles.raw_log_weights[best]))

@@ -138,6 +138,41 @@ class BehaviourSettings(GuidedSettings):
     resampling: str = resampling()
 
 
+@dataclass(frozen=True, slots=True)
+class TemperedSettings(SearchSettings):
+    """Knobs of tempered sequential Monte Carlo."""
+
+    title = "Tempered sequential Monte Carlo"
+
+    layers: int = next_frame_knob(
+        16, 2, 1000, 1, help="Layers in a frame: those that climb the ladder, and moves at its end."
+    )
+    particles: int = next_frame_knob(320, 2, 200000, 10, help="N: particles in every layer.")
+    likelihood_scale: float = knob(
+        100.0, 0.001, 100000.0, 1.0, label="likelihood's scale",
+        help="T: the posterior's exponent of the likelihood, in which each pixel counts as if it erred alone.",
+    )  # fmt: skip
+    survival: float = knob(
+        0.5, 0.02, 0.98, 0.01, label="survival rate",
+        help="Share of the particles that stays effective in a layer of the ladder (Eq. 11, 12).",
+    )  # fmt: skip
+    crossover: float = knob(
+        0.1, 0.0, 1.0, 0.05, label="crossover share",
+        help="Share of the particles that propose to exchange limbs with another (Eq. 19).",
+    )  # fmt: skip
+    limb_moves: float = knob(
+        0.2, 0.0, 1.0, 0.05, label="steps of one limb",
+        help="Share of the other particles that propose a step of one limb instead of the whole body.",
+    )  # fmt: skip
+    constraints: str = knob(
+        "reject", choices=("reject", "ignore"), label="impossible poses",
+        help="A pose that the body cannot take has no density, or is kept like any other.",
+    )  # fmt: skip
+    dynamics: str = dynamics()
+    resampling: str = resampling()
+    start_repeats: int = with_default(SearchSettings, "start_repeats", 1)
+
+
 def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...]:
     """Target α of each of the frame's layers, in the order they run.
 

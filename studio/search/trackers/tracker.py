@@ -164,6 +164,9 @@ class LayerRecord:
     parents : (2, N') of each particle of the next layer's set, which particles of this one it was drawn from: the first
         and, where it was crossed from two, the second, else NO_PARENT; (2, 0) where nothing is drawn.
     rows : (N,) numbers of `poses` in the set where not all were kept, else (0,).
+    temper, acceptance, log_evidence : of a tracker whose set is a sample of a posterior, the exponent of the likelihood
+        that the set is a sample with; the share of proposed moves that were taken into it; log of the evidence with the
+        exponent that the layer's weights lead to (nats). NaN for others.
     """
 
     frame: int = -1
@@ -184,6 +187,9 @@ class LayerRecord:
     model_free_share: float = math.nan
     parents: Indices = field(default_factory=lambda: np.zeros((2, 0), dtype=np.int64))
     rows: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    temper: float = math.nan
+    acceptance: float = math.nan
+    log_evidence: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
