@@ -92,6 +92,21 @@ def write_subject(subject: Subject, path: Path) -> None:
     path.write_text(tomli_w.dumps(entries), encoding="utf-8")
 
 
+def enlarged(subject: Subject, share: float) -> Subject:
+    """The subject with all its measures larger by a share; ratios stay."""
+
+    def times(measures: Mapping[str, float]) -> dict[str, float]:
+        return {name: (1.0 + share) * value for name, value in measures.items()}
+
+    height = None if subject.height_mm is None else (1.0 + share) * subject.height_mm
+    return msgspec.structs.replace(
+        subject,
+        height_mm=height,
+        lengths_mm=times(subject.lengths_mm),
+        dimensions_mm=times(subject.dimensions_mm),
+    )
+
+
 def subject_from_shape(body: BodyModel, numbers: ArrayLike) -> Subject:
     """The subject of the body's own shape file: its numbers in the order of the body file's `shape_order`.
 

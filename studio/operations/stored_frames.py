@@ -137,6 +137,15 @@ class LayerView:
         float | None,
         Field(description="Of a frame's first layer: particles moved without the behaviour model."),
     ] = None
+    temper: Annotated[
+        float | None, Field(description="Exponent of the likelihood that the set is a sample with.")
+    ] = None
+    acceptance: Annotated[
+        float | None, Field(description="Share of the proposed moves that were taken into the set.")
+    ] = None
+    log_evidence: Annotated[
+        float | None, Field(description="Log of the evidence after the layer (nats).")
+    ] = None
     variance_weighed: Array
     variance_resampled: Array
     variance_diffused: Array
@@ -371,6 +380,9 @@ def layer_summary(record: LayerRecord) -> dict[str, Any]:
         "alpha_wanted": record.alpha_wanted,
         "alpha_reached": record.alpha_reached,
         "model_free_share": record.model_free_share,
+        "temper": record.temper,
+        "acceptance": record.acceptance,
+        "log_evidence": record.log_evidence,
         "variance_weighed": record.variance_weighed,
         "variance_resampled": record.variance_resampled,
         "variance_diffused": record.variance_diffused,

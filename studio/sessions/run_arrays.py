@@ -15,6 +15,7 @@ from studio.sessions.run_record import RunRecord
 
 EXTRA = "notebook"
 LARGEST_BYTES = 4 << 30
+OF_LAYERS = ("beta", "alpha_wanted", "alpha_reached", "milliseconds", "temper", "acceptance", "log_evidence")
 
 
 def particles_dataset(
@@ -24,9 +25,9 @@ def particles_dataset(
 
     stored : of each frame. In the dataset: pose (frame, layer, particle, parameter), rad and mm; log_weight (frame,
     layer, particle), raw; number (frame, layer, particle), of the particle in its set; beta, alpha_wanted,
-    alpha_reached, milliseconds (frame, layer); parent (frame, layer, particle, which) numbers in the layer before, -1
-    for none; estimate (frame, parameter). What is missing is NaN or -1. Raises StudioError without xarray, RunError for
-    a run without frames, or one that takes more than 4 GB: name fewer frames.
+    alpha_reached, milliseconds, temper, acceptance, log_evidence (frame, layer); parent (frame, layer, particle,
+    which) numbers in the layer before, -1 for none; estimate (frame, parameter). What is missing is NaN or -1. Raises
+    StudioError without xarray, RunError for a run without frames, or one that takes more than 4 GB: name fewer frames.
     """
     xarray = load_extra("xarray", EXTRA)
     whole = list(stored)
@@ -42,9 +43,7 @@ def particles_dataset(
         )
     poses, weights = np.full((*shape, size), np.nan), np.full(shape, np.nan)
     numbers, parents = np.full(shape, -1, dtype=np.int64), np.full((*shape, 2), -1, dtype=np.int64)
-    single = {
-        name: np.full(shape[:2], np.nan) for name in ("beta", "alpha_wanted", "alpha_reached", "milliseconds")
-    }
+    single = {name: np.full(shape[:2], np.nan) for name in OF_LAYERS}
     for at, (layers, _) in enumerate(whole):
         drawn: np.ndarray[Any, np.dtype[np.int64]] = np.zeros((2, 0), dtype=np.int64)
         for level, layer in enumerate(layers):

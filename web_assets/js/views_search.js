@@ -386,11 +386,16 @@ function scheduleOfFrame(sheet, tables, at) {
   if (has("alpha_reached"))
     draw(0, "Survival α", "dashed: asked", numbers("", { min: 0, max: 1, scale: false }), [
       ["asked", "alpha_wanted", "text-quiet", asked],
+      ...(has("acceptance") ? [["moves taken", "acceptance", "layer-9", {}]] : []),
       ["reached", "alpha_reached", "accent", {}],
     ]);
   else draw(0, "Best log weight", "nats", numbers(), [["best", "best_log_weight", "accent", {}]]);
   const beta = positive ? logarithmic() : numbers();
-  if (has("beta")) draw(1, "Exponent β", "log scale", beta, [["β", "beta", "accent", {}]]);
+  if (has("temper"))
+    draw(1, "Exponent of the set", "how much of the likelihood it is a sample with", numbers(), [
+      ["exponent", "temper", "accent", {}],
+    ]);
+  else if (has("beta")) draw(1, "Exponent β", "log scale", beta, [["β", "beta", "accent", {}]]);
   else draw(1, "Particles", "in each layer", numbers(), [["particles", "particles", "accent", {}]]);
   const counts = sides.map((side) => side.tables.layers.at(-1).particles).join(" and ");
   draw(2, "Effective number", `of ${counts} particles, log scale`, logarithmic("", { min: 1 }), [
@@ -423,10 +428,17 @@ function scheduleOfFrame(sheet, tables, at) {
   if (at.tried) sheet.legend(["stored", "tried"], columns[0].left, 4, 160);
   const words = sides.map(({ name, tables: own }) => {
     const row = own.layers.find((one) => one.layer === at.layer) ?? own.layers.at(-1);
-    const what = `${layerWords(row.layer, at)}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}${Number.isFinite(row.largest) ? `, largest weight ${figure(100 * row.largest)} %` : ""}${row.alarm ? `. Alarm: ${row.alarm}` : ""}`;
+    const what = `${layerWords(row.layer, at)}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}${Number.isFinite(row.largest) ? `, largest weight ${figure(100 * row.largest)} %` : ""}${sampledWords(row)}${row.alarm ? `. Alarm: ${row.alarm}` : ""}`;
     return name ? `${name}: ${what}` : `L${what.slice(1)}`;
   });
   return `${words.join("; ")}.`;
+}
+
+/** What a sampled posterior's layer says besides, with a comma before. */
+function sampledWords({ temper, acceptance, log_evidence: evidence }) {
+  if (!Number.isFinite(temper)) return "";
+  const taken = Number.isFinite(acceptance) ? `, ${figure(100 * acceptance)} % of the moves taken` : "";
+  return `, exponent of the set ${figure(temper)}${taken}, log evidence ${figure(evidence)} nats`;
 }
 
 /** Schedule of the run: the ends of each frame's annealing over the frames. */
@@ -458,10 +470,13 @@ function scheduleOfRun(sheet, { frames: rows }, at) {
       );
     sheet.chosen(plot, { column: String(at.frame) });
   };
-  draw(0, "Exponent β", "of the first and last layer, log scale", logarithmic(), [
-    ["first layer", "beta_first", "layer-0"],
-    ["last layer", "beta_last", "layer-9"],
-  ]);
+  if (rows.some((row) => Number.isFinite(row.log_evidence)))
+    draw(0, "Log evidence", "nats", numbers(), [["log evidence", "log_evidence", "accent"]]);
+  else
+    draw(0, "Exponent β", "of the first and last layer, log scale", logarithmic(), [
+      ["first layer", "beta_first", "layer-0"],
+      ["last layer", "beta_last", "layer-9"],
+    ]);
   draw(1, "Least survival α", "reached in a frame", numbers("", { min: 0, scale: false }), [
     ["least α", "least_alpha", "accent"],
   ]);

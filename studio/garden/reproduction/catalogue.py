@@ -33,8 +33,10 @@ from studio.garden.reproduction.open_questions import (
     planted_losses,
     posterior,
     robustness,
+    sampled_posterior,
     shadow_masks,
     start_poses,
+    tempered_people,
 )
 
 # New experiments are added here, and to the table.
@@ -61,6 +63,8 @@ MODULES = (
     evaluations,
     effort,
     posterior,
+    sampled_posterior,
+    tempered_people,
     start_poses,
     defaults,
 )

@@ -113,6 +113,7 @@ def in_words(comparison: Comparison) -> str:
     order = ", ".join(f"{result.tracker} {result.mean_mm:.1f} mm" for result in ranked)
     count, seeds = len(comparison.frames), len(comparison.plan.seeds)
     sentences = [f"Mean error over {count} frames and {counted(seeds, 'seed')}, best first: {order}."]
+    sentences += evidence_words(comparison)
     sentences += [pair_words(pair) for pair in comparison.pairs]
     if comparison.pairs:
         sentences.append(NOT_INDEPENDENT)
@@ -121,6 +122,18 @@ def in_words(comparison: Comparison) -> str:
             sentences.append(f"With {counted(seeds, 'seed')} the seeds' p cannot fall below {least:.2g};")
             sentences[-1] += " six or more can show a difference at 5 %."
     return " ".join(sentences)
+
+
+def evidence_words(comparison: Comparison) -> list[str]:
+    """The log evidence of candidates that have one, the highest first, in a sentence."""
+    known = [(one.log_evidence, one.tracker) for one in comparison.trackers if one.log_evidence is not None]
+    if not known:
+        return []
+    order = ", ".join(f"{name} {value:.1f}" for value, name in sorted(known, reverse=True))
+    return [
+        f"Log evidence, nats a frame: {order}; of candidates with one likelihood and scale, the highest explains the"
+        " pictures best."
+    ]
 
 
 def pair_words(pair: PairTest) -> str:
@@ -219,5 +232,10 @@ def _plain_tracker(result: TrackerResult, seeds: tuple[int, ...]) -> dict[str, A
         for seed, run in zip(seeds, result.seeds, strict=True)
     ]
     fields = {name: getattr(result, name) for name in names}
-    rounded = {"mean_mm": round(result.mean_mm, 4), "seconds": round(result.seconds, 4)}
+    rounded: dict[str, float] = {
+        "mean_mm": round(result.mean_mm, 4),
+        "seconds": round(result.seconds, 4),
+    }
+    if result.log_evidence is not None:
+        rounded["log_evidence"] = round(result.log_evidence, 3)
     return {"tracker": result.tracker, **fields, **rounded, "seeds": runs}

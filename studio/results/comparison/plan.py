@@ -94,6 +94,12 @@ class TrackerResult:
         return sum(seed.lost_frames for seed in self.seeds)
 
     @property
+    def log_evidence(self) -> float | None:
+        """Nats a frame, mean over the seeds; None where the tracker has none."""
+        known = [seed.log_evidence for seed in self.seeds if seed.log_evidence is not None]
+        return float(np.mean(known)) if len(known) == len(self.seeds) else None
+
+    @property
     def seconds(self) -> float:
         """Seconds of the search, over all seeds."""
         return sum(seed.seconds for seed in self.seeds)

@@ -1,6 +1,7 @@
 """A tracker on a footage, in memory only: the trial of most experiments."""
 
 import dataclasses
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.motion_files.trc import read_trc
-from studio.body.subject import read_subject
+from studio.body.subject import Subject, enlarged, read_subject
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError, TruthError
@@ -56,7 +57,8 @@ class TrackingTrial:
     names, empty for all. body : a body's name or file, "" for the session's own. subject : a subject file beside the
     session's own, such as "subject_shape.toml" of the Lee-walk twin (no hands and feet), "" for its own. sigma_scale :
     multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path. shape_frames :
-    number of frames tracked first, to which the shape of the run is fitted (`runs.setup.shape_on_the_way`).
+    number of frames tracked first, to which the shape of the run is fitted (`runs.setup.shape_on_the_way`). larger :
+    share by which the subject's measures are enlarged, a wrong body on purpose.
     """
 
     footage: str
@@ -73,13 +75,14 @@ class TrackingTrial:
     subject: str = ""
     behaviour: str = ""
     shape_frames: int = 0
+    larger: float = 0.0
 
     def plain(self) -> dict[str, Any]:
         """As a trial's arguments; later fields are left out at their defaults, so that stored outcomes stay valid."""
         return {
             name: value
             for name, value in asdict(self).items()
-            if value or name not in ("behaviour", "shape_frames")
+            if value or name not in ("behaviour", "shape_frames", "larger")
         }
 
     @classmethod
@@ -96,9 +99,10 @@ class Tracked:
     frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
     lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
     search (weighting and tracker), without reading and preparing pictures; its share where seeds were tracked side by
-    side. named : per frame the limbs that the tracker
-    itself reported lost, as in a run's timeline. impossible_frames : frames whose pose breaks a hard prior (a joint
-    beyond its limits, a limb inside another); -1 in outcomes that were kept before it was counted.
+    side. named : per frame the limbs that the tracker itself reported lost, as in a run's timeline.
+    impossible_frames : frames whose pose breaks a hard prior (a joint beyond its limits, a limb inside another); -1 in
+    outcomes that were kept before it was counted. log_evidence : nats a frame, mean over the frames; None where the tracker has
+    none.
     """
 
     frames: list[int]
@@ -112,6 +116,7 @@ class Tracked:
     seconds: float
     named: list[list[str]] = field(default_factory=list[list[str]])
     impossible_frames: int = -1
+    log_evidence: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +159,8 @@ def track_seeds(
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
     subject = read_subject(session.path / trial.subject, session.manifest.body) if trial.subject else None
+    if trial.larger:
+        subject = enlarged(subject or session.subject() or Subject(body=session.manifest.body), trial.larger)
     body = session.body(trial.body or None, subject)
     settings = settings_of(trial)
     cameras, fps = _cameras(session, trial.cameras), session.manifest.fps
@@ -168,6 +175,8 @@ def track_seeds(
         return spoilt.evidence(cache.evidence(session, cameras, frame, settings.evidence, kind, pictures))
 
     start = _start_pose(session, body, trial.first)
+    if trial.larger and start is not None:
+        start = tuple(map(float, pose_on_truth(session, body, trial.first, np.array(start))))
     if trial.shape_frames and start is not None:
         sigma, first = session_sigma(session, body, rate), frames[: trial.shape_frames]
         of_shape = partial(evidence, name=WEIGHTING)
@@ -175,9 +184,19 @@ def track_seeds(
         body, start = shaped.body, tuple(float(value) for value in shaped.start)
     sigma = session_sigma(session, body, rate) * trial.sigma_scale
     space = search_space(body, sigma, _behaviour(session, body, settings, trial))
+    evidences = [dict[int, float]() for _ in seeds]
+
+    def noting(own: dict[int, float]) -> Callable[[LayerRecord], None]:
+        def note(record: LayerRecord) -> None:
+            own[record.frame] = record.log_evidence
+            if on_layer is not None:
+                on_layer(record)
+
+        return note
+
     runs = [
-        Following(settings, space, start_of(start), seed, FrameRefiner(body, seen_with, seed), on_layer)
-        for seed in seeds
+        Following(settings, space, start_of(start), seed, FrameRefiner(body, seen_with, seed), noting(own))
+        for seed, own in zip(seeds, evidences, strict=True)
     ]
     likelihood = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)
     seconds, evaluations, named = 0.0, 0, [list[list[str]]() for _ in runs]
@@ -191,7 +210,7 @@ def track_seeds(
             lost.append(list(result.limbs_lost))
         report("tracking", number + 1, len(frames))
     tracked: list[Tracked] = []
-    for run, lost in zip(runs, named, strict=True):
+    for run, lost, own in zip(runs, named, evidences, strict=True):
         poses = np.array(run.poses)
         if settings.refinement.refine_frames:
 
@@ -208,7 +227,15 @@ def track_seeds(
         by_frame = dict(zip(frames, lost, strict=True))
         impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())
         named_of = [by_frame[frame] for frame in figures.frames]
-        tracked.append(dataclasses.replace(figures, named=named_of, impossible_frames=impossible))
+        evidence_mean = float(np.mean(list(own.values())))
+        tracked.append(
+            dataclasses.replace(
+                figures,
+                named=named_of,
+                impossible_frames=impossible,
+                log_evidence=round(evidence_mean, 3) if math.isfinite(evidence_mean) else None,
+            )
+        )
     return tracked
 
 

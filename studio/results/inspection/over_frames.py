@@ -27,10 +27,11 @@ SOME = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameSummary:
-    """variances : (L, 3, D) of each layer as weighed, before and after noise. betas, alphas, effective : (L,). alarms :
-    (L,) which layers have one. spread : (M,) root mean squared distance of the last set's points from their mean, mm.
-    ranks : (M, 3) share of the last set's weight below the truth's coordinates, NaN where there is none. disagreement :
-    as in the frame's result. search_layers, searches : layers of one search of the frame, and how many it had.
+    """variances : (L, 3, D) of each layer as weighed, before and after noise. betas, alphas, effective : (L,).
+    alarms : (L,) which layers have one. spread : (M,) root mean squared distance of the last set's points from their
+    mean, mm. ranks : (M, 3) share of the last set's weight below the truth's coordinates, NaN where there is none.
+    disagreement : as in the frame's result. log_evidence : of the last layer, NaN where the tracker has none.
+    search_layers, searches : layers of one search of the frame, and how many it had.
     """
 
     variances: Floats
@@ -41,6 +42,7 @@ class FrameSummary:
     spread: Array
     ranks: Array
     disagreement: Mapping[str, float]
+    log_evidence: float
     search_layers: int
     searches: int
 
@@ -77,6 +79,7 @@ def summary_of(frame: InspectedFrame) -> FrameSummary:
         spread,
         ranks,
         {} if frame.result is None else frame.result.disagreement,
+        layers[last].log_evidence,
         frame.search_layers,
         frame.searches,
     )
@@ -177,6 +180,7 @@ def schedule_rows(run: InspectedRun, selection: Selection) -> ViewResult:
                     no_value(float(entry.alphas[entry.last_search].min())),
                     float(entry.effective[entry.last_search].min()),
                     int(entry.alarms[entry.last_search].sum()),
+                    no_value(entry.log_evidence),
                 )
                 for frame, entry in by_frame.items()
             ]

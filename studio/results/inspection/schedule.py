@@ -1,5 +1,6 @@
 """Whether annealing proceeded as asked: β, survival rate and effective number of every layer (Deutscher & Reid 2005,
-section 3.1, Eq. 11 and 12).
+section 3.1, Eq. 11 and 12); of a sampled posterior the exponent that each set is a sample with, the moves taken, and
+the evidence.
 """
 
 import math
@@ -28,6 +29,9 @@ VIEW = View(
             ("best_log_weight", "Best log weight", "nats"),
             ("milliseconds", "Time", "ms"),
             ("settings_version", "Settings version"),
+            ("temper", "Exponent of the set"),
+            ("acceptance", "Moves taken"),
+            ("log_evidence", "Log evidence", "nats"),
             ("alarm", "Alarm"),
         ),
         table(
@@ -39,6 +43,7 @@ VIEW = View(
             ("least_alpha", "Least α reached"),
             ("least_effective", "Least effective number"),
             ("alarms", "Layers with an alarm"),
+            ("log_evidence", "Log evidence", "nats"),
             of_run=True,
         ),
     ),
@@ -87,6 +92,9 @@ def rows(frame: InspectedFrame, selection: Selection) -> dict[str, list[Row]]:
                 record.best_log_weight,
                 record.milliseconds,
                 record.settings_version,
+                no_value(record.temper),
+                no_value(record.acceptance),
+                no_value(record.log_evidence),
                 alarm_of(frame, layer),
             )
         )

@@ -1,6 +1,7 @@
 """Consecutive frames searched one after the other in memory: a run without store, events and recovery."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -98,8 +99,14 @@ def step_together(
     """Search a frame for runs of the same settings, side by side where a card does it; each has the result that it has
     alone. seen : as in `Following.step`.
     """
-    first = runs[0]
+    settings, turn = runs[0].settings.tracker, itertools.cycle(runs)
+
+    def on_layer(record: LayerRecord) -> None:
+        tell = next(turn).on_layer
+        if tell is not None:
+            tell(record)
+
     results = search_together(
-        [run.search_of(frame) for run in runs], problem, lambda: (1, first.settings.tracker), first.on_layer
+        [run.search_of(frame) for run in runs], problem, lambda: (1, settings), on_layer
     )
     return [run.conclude(result, problem, seen) for run, result in zip(runs, results, strict=True)]

@@ -323,7 +323,9 @@ def search_together(
     settings_source: SettingsSource,
     on_layer: Callable[[LayerRecord], None] | None = None,
 ) -> list[FrameResult]:
-    """Search a frame to its end, a layer of all searches at a time (`step_together`)."""
+    """Search a frame to its end, a layer of all searches at a time (`step_together`). on_layer : gets each search's
+    record of a layer, in their order.
+    """
     settings = None
     while not searches[0].finished:
         version, settings = settings_source()

@@ -71,9 +71,9 @@ from studio.search.trackers.tracker import (
 
 BEFORE, BEFORE_RAW, BEFORE_ELIGIBLE, BEFORE_PRIOR = "before", "before_raw", "before_eligible", "before_prior"
 KIND, PARTNER, BACK, LADDER = "move", "partner", "back", "ladder"
-"""Names of a set's arrays: the poses (N, D) that its moves lead from, their log w (N,) twice, as of `weigh`, and logs of
-their prior (N,); of each move its kind (N,), with whom limbs are exchanged (N,), else the particle itself, and how much
-likelier the move is than the one back (N,), in logs of densities; `_Ladder`."""
+"""Names of a set's arrays: the poses (N, D) that its moves lead from, their log w (N,) twice, as of `weigh`, and logs
+of their prior (N,); of each move its kind (N,), with whom limbs are exchanged (N,), else the particle itself, and how
+much likelier the move is than the one back (N,), in logs of densities; `_Ladder`."""
 WHOLE, ONE_LIMB, EXCHANGE = 0, 1, 2
 BEST_SHARE, LEAST_CHANGE, MOST_CHANGE = 0.25, 0.5, 2.0
 """Share of moves that is best taken (Roberts & Rosenthal 2001), and how much steps may change from layer to layer."""

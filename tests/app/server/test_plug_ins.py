@@ -206,7 +206,7 @@ def test_a_broken_package_is_named_and_hinders_nothing(site: Path, toy_root: Pat
     points = {name: f"broken_capture.{place}" for name, place in modules.items()}
     lay_out(site, BROKEN, "broken-capture", {"studio.trackers": points})
     forget()
-    assert list(TRACKERS) == ["annealed", "behaviour", "condensation", "swarm"]
+    assert list(TRACKERS) == ["annealed", "behaviour", "condensation", "swarm", "tempered"]
     assert TRACKERS["annealed"].label == "Annealed particle filter"
     with pytest.raises(
         PlugInError, match=r"'broken-capture' adds a tracker 'missing'.*no_such_module_anywhere"

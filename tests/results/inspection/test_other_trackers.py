@@ -28,6 +28,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
     [
         ("swarm", "", {}),
         ("condensation", "", {"particles": 60, "refine_frames": False}),
+        ("tempered", "", {"particles": 30, "layers": 6, "refine_frames": False}),
         ("annealed", "blobs", {"particles": 20, "layers": 3, "refine_frames": False}),
         ("annealed", "bodytrack", {"particles": 10, "layers": 3}),
     ],
@@ -45,6 +46,13 @@ def test_every_view_answers(session: Session, tracker: str, weighting: str, knob
     if tracker == "swarm":
         assert "no β" in look(run, 2, "schedule", Selection()).notes[0]
         assert look(run, 2, "schedule", Selection()).table("layers").column("beta")[0] is None
+    layers = look(run, 2, "schedule", Selection()).table("layers")
+    evidence = look_over(run, "schedule", Selection()).table("frames").column("log_evidence")
+    for name in ("temper", "acceptance", "log_evidence"):
+        assert (layers.column(name)[-1] is not None) == (tracker == "tempered")
+    assert all((value is not None) == (tracker == "tempered") for value in evidence)
+    if tracker == "tempered":
+        assert evidence[2] == layers.column("log_evidence")[-1]
 
 
 @pytest.mark.slow

@@ -1,0 +1,164 @@
+"""Whether the last cloud of tempered sequential Monte Carlo is a sample of the posterior that it states.
+
+Simulation-based calibration (Talts, Betancourt, Simpson, Vehtari & Gelman 2018): a pose is drawn from the prior, a
+silhouette from the likelihood given it, and the cloud searched for it. The pose's rank in the cloud is uniform if, and
+for all practical purposes only if, the cloud is a sample of the posterior. This takes a likelihood that *is* the
+density of what is seen: of a planar arm, of whose silhouette each pixel is turned over independently with probability
+ε, the density of the picture is (ε / (1 - ε)) to the number of pixels that differ from the pose's. The template
+likelihood is minus the share of pixels that differ, so that its scale is the number of pixels times log((1 - ε) / ε).
+The prior is uniform between the joints' limits. A scale four times too large, and one four times too small, must fail.
+
+People, whose likelihood is no density, have no ranks to check: there a cloud of few evaluations is compared with one of
+a million by another algorithm, differential evolution Markov chains (ter Braak 2006), with the same prior and scale.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.foundations.arrays import Array
+from studio.foundations.progress import report
+from studio.garden.reproduction.claims import share
+from studio.garden.reproduction.deutscher_reid.arms import TemplateArm, silhouette, template_arm
+from studio.garden.reproduction.experiment import Part, group_of, listed
+from studio.garden.reproduction.open_questions.posterior import LEVELS, band, distribution, rank
+from studio.results.comparison.findings import Chart, Series, Table
+from studio.results.comparison.footage_cache import FootageCache
+from studio.results.comparison.statistics import number
+from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
+from studio.search.likelihood.problem import FrameLikelihood
+from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.frame_loop import search_frame
+from studio.search.trackers.tracker import FilterState
+
+ARM_BODIES = ("planar_arm4", "branched_arms6")
+TURNED = 0.3
+"""Probability ε of a pixel to be turned over."""
+POSES, QUICK_POSES = 30, 6
+"""A seed's simulated pictures."""
+KNOBS: Mapping[str, Any] = {"layers": 80, "particles": 200, "survival": 0.7}
+RIGHT = "the density's scale"
+SCALES: Mapping[str, float] = {RIGHT: 1.0, "four times too large": 4.0, "four times too small": 0.25}
+
+
+def trials(scale: Scale) -> tuple[Trial, ...]:
+    """A batch of simulated pictures a body, scale and seed."""
+    poses = QUICK_POSES if scale.quick else POSES
+    return tuple(
+        Trial(
+            f"{kind}, {body}, seed {seed}",
+            {"body": body, "seed": seed, "times": times, "poses": poses, "knobs": dict(KNOBS)},
+        )
+        for body in ARM_BODIES[: 1 if scale.quick else None]
+        for kind, times in SCALES.items()
+        for seed in scale.seeds
+    )
+
+
+@cache
+def scene(body: str) -> TemplateArm:
+    """The body before its camera."""
+    return template_arm(body)
+
+
+def turned_over(arm: TemplateArm, pose: Array, rng: np.random.Generator) -> FrameLikelihood:
+    """A picture of a pose (D,) whose pixels are turned over at random, as a function of poses."""
+    mask = silhouette(arm.body, arm.camera, pose)
+    wrong = rng.random(mask.shape) < TURNED
+    mask = np.where(wrong, 255 - mask, mask).astype(np.uint8)
+    picture = np.repeat(mask[:, :, None], 3, axis=2)
+    return arm.likelihood.problem(
+        FrameEvidence(0, (ViewEvidence(arm.camera.name, picture, mask, np.zeros_like(mask)),))
+    )
+
+
+def scale_of_density(arm: TemplateArm) -> float:
+    """The exponent with which the template likelihood is the density of a picture."""
+    return arm.camera.width * arm.camera.height * math.log((1.0 - TURNED) / TURNED)
+
+
+@kept_as("open_questions.sampled_posterior.measure")
+def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Ranks (K, D) of the simulated poses in their clouds; by picture the share of moves taken in the last layer, and
+    whether the ladder reached its end.
+    """
+    del cache
+    arm, tracker, seed = scene(arguments["body"]), TRACKERS["tempered"], int(arguments["seed"])
+    scale = scale_of_density(arm) * float(arguments["times"])
+    settings = tracker.settings_type(**{**arguments["knobs"], "likelihood_scale": scale})
+    ranks, taken, ended = list[list[float]](), list[float](), list[bool]()
+    for at in range(int(arguments["poses"])):
+        rng = np.random.default_rng((seed, at, 31))
+        truth = rng.uniform(arm.space.lower, arm.space.upper)
+        problem, last = turned_over(arm, truth, rng), []
+        result = search_frame(
+            tracker,
+            problem,
+            FilterState(None),
+            arm.space,
+            seed=seed,
+            frame=at,
+            settings_source=lambda: (1, settings),
+            on_layer=last.append,
+        )
+        cloud = result.carried.particles
+        assert cloud is not None
+        weights = np.exp(cloud.log_weights)
+        ranks.append([rank(cloud.poses[:, d], weights, float(truth[d])) for d in range(len(truth))])
+        taken.append(float(last[-1].acceptance))
+        ended.append(bool(last[-1].beta == 0.0))
+        report("pictures", at + 1, int(arguments["poses"]))
+    names = [entry.label for entry in arm.body.parameters]
+    return {"parameters": names, "ranks": ranks, "taken": taken, "ended": ended}
+
+
+def are_uniform(ranks: Array) -> bool:
+    """Whether the ranks (K,) of one parameter stay within the simultaneous 95 % band of K independent ones."""
+    return bool(np.all(np.abs(distribution(ranks) - np.array(LEVELS)) <= band(len(ranks))))
+
+
+def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    """By body and scale, how many parameters have uniform ranks, and their distributions."""
+    groups: dict[str, list[Mapping[str, Any]]] = {}
+    for outcome in outcomes:
+        groups.setdefault(group_of(outcome.trial), []).append(outcome.measured)
+    rows = []
+    for group, entries in groups.items():
+        ranks = np.concatenate([np.array(one["ranks"]) for one in entries])
+        names, count = entries[0]["parameters"], len(ranks)
+        uniform = [are_uniform(ranks[:, d]) for d in range(len(names))]
+        is_right = group.startswith(RIGHT)
+        if is_right:
+            yield share(f"{group}: parameters with uniform ranks", uniform, 1.0)
+        else:
+            yield share(f"{group}: parameters with uniform ranks", uniform, 0.0)
+        outside = [float(((own < 0.025) | (own > 0.975)).mean()) for own in ranks.T]
+        for name, one, far in zip(names, uniform, outside, strict=True):
+            away = float(np.max(np.abs(distribution(ranks[:, names.index(name)]) - np.array(LEVELS))))
+            rows.append(
+                (group, name, count, round(away, 3), round(band(count), 3), one, round(100.0 * far, 1))
+            )
+        yield number(f"{group}: moves taken at the end", [np.mean(one["taken"]) for one in entries], "of 1")
+        series = [
+            Series(name, LEVELS, tuple(distribution(ranks[:, d]).tolist())) for d, name in enumerate(names)
+        ]
+        for sign, word in ((-1.0, "lower"), (1.0, "upper")):
+            edge = tuple(min(max(level + sign * band(count), 0.0), 1.0) for level in LEVELS)
+            series.append(Series(f"95 % band, {word}", LEVELS, edge, group="band", dashed=True))
+        yield Chart(
+            f"Rank of the simulated pose: {group}", "lines", "rank", "share of the ranks", tuple(series)
+        )
+    heads = (
+        *("body and scale", "parameter", "pictures", "largest distance", "band", "uniform"),
+        "truth outside the middle 95 % (%)",
+    )
+    yield Table("Every parameter", heads, tuple(rows))
+    yield "The band is of one parameter; of ten with uniform ranks one in two would leave it somewhere in a hundred."
+    yield {"pixels turned over": TURNED, **KNOBS}
+
+
+EXPERIMENTS = (listed("sampled-posterior", trials, measure, shown),)
