@@ -101,8 +101,8 @@ class Tracked:
     search (weighting and tracker), without reading and preparing pictures; its share where seeds were tracked side by
     side. named : per frame the limbs that the tracker itself reported lost, as in a run's timeline.
     impossible_frames : frames whose pose breaks a hard prior (a joint beyond its limits, a limb inside another); -1 in
-    outcomes that were kept before it was counted. log_evidence : nats a frame, mean over the frames; None where the tracker has
-    none.
+    outcomes that were kept before it was counted. log_evidence : nats a frame, mean over the frames; None where the
+    tracker has none.
     """
 
     frames: list[int]

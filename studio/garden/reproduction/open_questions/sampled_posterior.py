@@ -12,6 +12,7 @@ People, whose likelihood is no density, have no ranks to check: there a cloud of
 a million by another algorithm, differential evolution Markov chains (ter Braak 2006), with the same prior and scale.
 """
 
+import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -21,8 +22,9 @@ import numpy as np
 
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import report
-from studio.garden.reproduction.claims import share
+from studio.garden.reproduction.claims import geometric_mean, share
 from studio.garden.reproduction.deutscher_reid.arms import TemplateArm, silhouette, template_arm
 from studio.garden.reproduction.experiment import Part, group_of, listed
 from studio.garden.reproduction.open_questions.posterior import LEVELS, band, distribution, rank
@@ -30,10 +32,17 @@ from studio.results.comparison.findings import Chart, Series, Table
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.statistics import number
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
+from studio.runs.live.following import Following
+from studio.runs.search_space import search_space, session_sigma
+from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.problem import FrameLikelihood
-from studio.search.trackers.catalogue import TRACKERS
+from studio.search.settings import RunSettings, default_settings
+from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.search.trackers.frame_loop import search_frame
-from studio.search.trackers.tracker import FilterState
+from studio.search.trackers.frame_prior import FramePrior
+from studio.search.trackers.random_numbers import RandomNumbers
+from studio.search.trackers.tracker import FilterState, LayerRecord, SearchSpace, start_of
+from studio.sessions.session import Session
 
 ARM_BODIES = ("planar_arm4", "branched_arms6")
 TURNED = 0.3
@@ -161,4 +170,155 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield {"pixels turned over": TURNED, **KNOBS}
 
 
-EXPERIMENTS = (listed("sampled-posterior", trials, measure, shown),)
+PEOPLE_CLIPS = ("walk", "choosing-turns")
+WEIGHTING = "edge-region-silhouette"
+AT_FRAMES, QUICK_FRAMES = (4, 12), (4,)
+SIZES = (5000, 20_000, 80_000)
+CHAINS, GENERATIONS, QUICK_GENERATIONS, KEPT_EVERY = 200, 5000, 200, 25
+JUMP_EVERY = 10
+"""Generations after which chains step by a whole difference of two others, between modes."""
+LITTLE = 1e-3
+"""Of σ0: noise that lets chains leave the plane of the others."""
+
+
+def people_trials(scale: Scale) -> tuple[Trial, ...]:
+    """A frame of a clip a seed."""
+    return tuple(
+        Trial(
+            f"{clip}, frame {frame}, seed {seed}",
+            {
+                "clip": clip,
+                "frame": frame,
+                "seed": seed,
+                "sizes": list(SIZES[: 1 if scale.quick else None]),
+                "generations": QUICK_GENERATIONS if scale.quick else GENERATIONS,
+            },
+        )
+        for clip in PEOPLE_CLIPS[: 1 if scale.quick else None]
+        for frame in (QUICK_FRAMES if scale.quick else AT_FRAMES)
+        for seed in scale.seeds
+    )
+
+
+@kept_as("open_questions.sampled_posterior.measure_people")
+def measure_people(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Of clouds of each size: the distance of their means from the chains' in the chains' deviations, root mean square
+    over the parameters; the geometric mean of the deviations over the chains'; log evidence.
+    """
+    session, last = cache.session(arguments["clip"]), int(arguments["frame"])
+    body, cameras = session.body(), session.cameras()
+    settings = default_settings("tempered", WEIGHTING)
+    likelihood = WEIGHTINGS[WEIGHTING].prepare(body, cameras, settings.weighting)
+    space = search_space(body, session_sigma(session, body, session.manifest.fps))
+    start = session.start_pose(body)
+    run = Following(
+        settings, space, start_of(None if start is None else tuple(map(float, start))), int(arguments["seed"])
+    )
+    for frame in range(last):
+        run.step(frame, likelihood.problem(_seen(cache, session, cameras, frame, settings)))
+    problem = likelihood.problem(_seen(cache, session, cameras, last, settings))
+    before, scale = run.carried, float(settings.tracker.likelihood_scale)
+    chains = chains_of(problem, before, space, scale, int(arguments["seed"]), int(arguments["generations"]))
+    middle, deviation = chains.mean(axis=0), np.maximum(chains.std(axis=0), 1e-12)
+    clouds = dict[str, dict[str, float]]()
+    for size in arguments["sizes"]:
+        knobs = dataclasses.replace(settings.tracker, **knobs_for_evaluations("tempered", int(size)))
+        records: list[LayerRecord] = []
+        result = search_frame(
+            TRACKERS["tempered"],
+            problem,
+            before,
+            space,
+            seed=int(arguments["seed"]),
+            frame=last,
+            settings_source=lambda knobs=knobs: (1, knobs),
+            on_layer=records.append,
+        )
+        cloud = result.carried.particles
+        assert cloud is not None
+        weights = np.exp(cloud.log_weights)
+        mean = weights @ cloud.poses
+        spread = np.sqrt(weights @ (cloud.poses - mean) ** 2)
+        clouds[str(size)] = {
+            "off": float(np.sqrt(np.mean(((mean - middle) / deviation) ** 2))),
+            "spread": float(np.exp(np.mean(np.log(np.maximum(spread, 1e-12) / deviation)))),
+            "log_evidence": float(records[-1].log_evidence),
+        }
+    halves = [half.mean(axis=0) for half in np.array_split(chains, 2)]
+    agreement = float(np.sqrt(np.mean(((halves[0] - halves[1]) / deviation) ** 2)))
+    return {"clouds": clouds, "chains_apart": agreement}
+
+
+def chains_of(
+    problem: FrameLikelihood,
+    before: FilterState,
+    space: SearchSpace,
+    scale: float,
+    seed: int,
+    generations: int,
+) -> Array:
+    """(K, D) poses of the posterior, of CHAINS chains of differential evolution (ter Braak 2006) that begin in the
+    prior; each half moves by differences of the other's members. The first half of the generations is left out.
+    """
+    prior = FramePrior.of_frame(before, space, scale=1.0, dynamics="none", bounded=True)
+    poses, size = prior.draw(RandomNumbers.of_beginning(seed, 0), CHAINS), len(space.names)
+    rng = np.random.default_rng((seed, 77))
+
+    def log_posterior(rows: Array) -> Array:
+        density = prior.log_density(rows)
+        values = scale * problem.log_likelihood(rows) + density
+        return np.where(np.isfinite(density) & problem.feasible(rows), values, -np.inf)
+
+    weights, kept = log_posterior(poses), list[Array]()
+    halves = np.arange(CHAINS).reshape(2, -1)
+    for generation in range(generations):
+        step = 1.0 if generation % JUMP_EVERY == 0 else 2.38 / math.sqrt(2.0 * size)
+        for own, other in (halves, halves[::-1]):
+            pairs = np.array([rng.choice(other, 2, replace=False) for _ in own])
+            moved = poses[own] + step * (poses[pairs[:, 0]] - poses[pairs[:, 1]])
+            moved += LITTLE * space.sigma * rng.normal(size=moved.shape)
+            proposed = log_posterior(moved)
+            taken = np.log(rng.random(len(own))) < proposed - weights[own]
+            poses[own[taken]], weights[own[taken]] = moved[taken], proposed[taken]
+        if generation >= generations // 2 and generation % KEPT_EVERY == 0:
+            kept.append(poses.copy())
+        report("generations of the chains", generation + 1, generations)
+    return np.concatenate(kept)
+
+
+def _seen(
+    cache: FootageCache, session: Session, cameras: tuple[Camera, ...], frame: int, settings: RunSettings
+) -> FrameEvidence:
+    chosen = WEIGHTINGS[WEIGHTING]
+    return cache.evidence(session, cameras, frame, settings.evidence, chosen.edge_kind, chosen.reads_pictures)
+
+
+def people_shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    """By size: how far clouds are from the chains."""
+    sizes = dict.fromkeys(size for outcome in outcomes for size in outcome.measured["clouds"])
+    rows = list[tuple[Any, ...]]()
+    for size in sizes:
+        own = [outcome.measured["clouds"][size] for outcome in outcomes if size in outcome.measured["clouds"]]
+        off, spread = [one["off"] for one in own], [one["spread"] for one in own]
+        yield number(f"{size} evaluations: means off", off, "deviations")
+        yield number(f"{size} evaluations: spread over the chains'", spread, "×", statistic=geometric_mean)
+        rows += [
+            (
+                outcome.trial.name,
+                int(size),
+                *(round(outcome.measured["clouds"][size][name], 2) for name in KEYS),
+            )
+            for outcome in outcomes
+        ]
+    apart = [outcome.measured["chains_apart"] for outcome in outcomes]
+    yield number("the chains' first and second half apart", apart, "deviations")
+    heads = ("frame", "evaluations", "means off (deviations)", "spread (×)", "log evidence (nats)")
+    yield Table("Every frame", heads, tuple(rows))
+    yield {"weighting": WEIGHTING, "chains": CHAINS, "generations": GENERATIONS}
+
+
+KEYS = ("off", "spread", "log_evidence")
+EXPERIMENTS = (
+    listed("sampled-posterior", trials, measure, shown),
+    listed("sampled-people", people_trials, measure_people, people_shown, footage=PEOPLE_CLIPS),
+)

@@ -9,11 +9,11 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from studio.garden.drawn_recipes import HALVES, REPORTING, clip_name
-from studio.garden.reproduction.claims import percent
+from studio.garden.reproduction.claims import geometric_mean, percent
 from studio.garden.reproduction.experiment import Part
 from studio.garden.reproduction.tracking import Candidate, Line, lost_percent, mean_errors, tracked_experiment
 from studio.results.comparison.findings import Table
-from studio.results.comparison.statistics import geometric_mean, number
+from studio.results.comparison.statistics import number
 from studio.results.comparison.tracked import Tracked
 
 KINDS = ("walk", "kick", "leap", "turns", "dance", "sit", "run", "arms", "crouch", "cartwheel")
