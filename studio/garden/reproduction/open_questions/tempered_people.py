@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from studio.garden.drawn_recipes import HALVES, REPORTING, clip_name
-from studio.garden.reproduction.claims import geometric_mean, percent
+from studio.garden.reproduction.claims import LOWER, beyond, geometric_mean, percent
 from studio.garden.reproduction.experiment import Part
 from studio.garden.reproduction.tracking import Candidate, Line, lost_percent, mean_errors, tracked_experiment
 from studio.results.comparison.findings import Table
@@ -51,7 +51,7 @@ def _errors_shown(groups: dict[str, list[Tracked]]) -> Iterable[Part]:
             rows.append((half, kind, round(float(np.mean(ours)), 1), round(float(np.mean(theirs)), 1), *lost))
         if ratios:
             by_seed = [geometric_mean(np.array(one)) for one in zip(*ratios, strict=True)]
-            yield number(f"{half} half: error over the improved filter's", by_seed, "×", ALLOWED, "lower")
+            yield beyond(number(f"{half} half: error over the improved filter's", by_seed, "×"), ALLOWED, LOWER)
     heads = ("half", "clip", "tempered (mm)", "improved (mm)", "tempered, lost (%)", "improved, lost (%)")
     yield Table("Each clip", heads, tuple(rows))
     yield {"evaluations": EVALUATIONS, "weighting": WEIGHTING, "refined": "no"}
