@@ -29,6 +29,7 @@ _VERBS = {
     "studio.operations.notes": ("note", "notes"),
     "studio.operations.opening": (
         "bodies",
+        "inference_data",
         "list_runs",
         "list_sessions",
         "open_run",

@@ -21,6 +21,7 @@ from studio.runs.setup.workflow import Workflow, run_to_use, workflow_of
 from studio.runs.sides import in_words
 from studio.runs.tracks import Track
 from studio.sessions.names import is_name
+from studio.sessions.run_arrays import inference_data as chains_of
 from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
 from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.work_under_way import gone, working_on
@@ -161,6 +162,18 @@ def open_run(run: RunName) -> StoredRun:
         raise RunError(f"'{run}' names no run.", "Write SESSION/RUN, such as walk/run-1.")
     place = Path(session)
     return open_session(place.parent if place.name == RUNS_NAME else session).run(name)
+
+
+def inference_data(*runs: RunName, frames: Iterable[int] | None = None) -> Any:  # noqa: ANN401 - arviz.InferenceData
+    """The last clouds of runs that differ by seed, as chains of one `arviz.InferenceData`, with all layers.
+
+    frames : some instead of all finished ones. Raises StudioError without ArviZ, RunError where the runs do not fit
+    together, NotFoundError.
+    """
+    if not runs:
+        raise RunError("No run is named.", "Name one or more: studio.inference_data('walk/run-1').")
+    chosen = None if frames is None else list(frames)
+    return chains_of([open_run(run).to_xarray(chosen) for run in runs])
 
 
 def session_of(run: StoredRun) -> Session:

@@ -231,6 +231,15 @@ PRESETS = (
     ),
 )
 
+SAMPLED = (
+    Preset(
+        "sampled posterior",
+        "The last cloud is a sample of the posterior, and nothing is refined, so that it stays one.",
+        {"refine_frames": False},
+        "tempered",
+    ),
+)
+
 GUIDED = Variant(
     "first sets predicted by a behaviour model (Caillette et al.), a fifth of the particles without it",
     {"prediction": BEHAVIOUR},

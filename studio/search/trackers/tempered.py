@@ -59,7 +59,7 @@ from studio.search.trackers.particles import (
 )
 from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.resampling import draw
-from studio.search.trackers.settings import TemperedSettings
+from studio.search.trackers.settings import SAMPLED, TemperedSettings
 from studio.search.trackers.tracker import (
     NO_PARENT,
     FilterState,
@@ -115,6 +115,7 @@ class TemperedFilter(ParticleFilter[TemperedSettings]):
     label = "Tempered sequential Monte Carlo"
     settings_type = TemperedSettings
     size_knobs = (("layers", "particles"),)
+    presets = SAMPLED
 
     def layer_count(self, settings: TemperedSettings) -> int:
         return settings.layers
