@@ -29,6 +29,7 @@ from studio.garden.reproduction.open_questions import (
     effort,
     evaluations,
     generalisation,
+    likelihood_scale,
     other_people,
     planted_losses,
     posterior,
@@ -65,6 +66,7 @@ MODULES = (
     posterior,
     sampled_posterior,
     tempered_people,
+    likelihood_scale,
     start_poses,
     defaults,
 )

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from studio.garden.reproduction.deutscher_reid.arms import silhouette
+from studio.garden.reproduction.open_questions import likelihood_scale, tempered_people
 from studio.garden.reproduction.open_questions import sampled_posterior as sampled
-from studio.garden.reproduction.open_questions import tempered_people
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.kept_trials import plain
 from studio.results.comparison.trials import Outcome, Scale, Trial
@@ -132,3 +132,32 @@ def test_the_experiments_on_people_pair_their_lines() -> None:
     ]
     assert ratio.ours == pytest.approx(1.2)
     assert ratio.verdict == "not reproduced"
+
+
+def test_a_cloud_that_the_truth_is_drawn_like_covers_it_as_often_as_it_says() -> None:
+    rng, root = np.random.default_rng(4), np.array([[3.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.5, -1.0, 1.0]])
+
+    def shares(times: float) -> list[list[float]]:
+        found = []
+        for _ in range(300):
+            cloud = rng.normal(size=(400, 2, 3)) @ root.T
+            truth = times * rng.normal(size=(2, 3)) @ root.T
+            found.append(likelihood_scale.share_nearer(cloud, np.full(400, 1 / 400), truth).tolist())
+        return found
+
+    promised = np.array(likelihood_scale.PROMISED)
+    assert np.allclose(likelihood_scale.covered([{"shares": shares(1.0)}]), promised, atol=0.05)
+    assert np.all(likelihood_scale.covered([{"shares": shares(3.0)}]) < promised - 0.3)
+
+
+@pytest.mark.slow
+def test_a_scale_is_measured_on_a_person() -> None:
+    cache = FootageCache(SAMPLES)
+    trials = likelihood_scale.trials(Scale((0,), quick=True))
+    one = {**trials[0].arguments, "footage": "walk", "last": 7}
+    one["changes"] = {**one["changes"], "layers": 4, "particles": 30}
+    measured = json.loads(json.dumps(plain(likelihood_scale.measure(one, cache))))
+    cache.close()
+    assert np.shape(measured["shares"])[0] == 2
+    parts = list(likelihood_scale.shown([Outcome(trial, measured) for trial in trials]))
+    assert len(parts) == 7

@@ -304,7 +304,7 @@ def people_shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         yield number(f"{size} evaluations: spread over the chains'", spread, "×", statistic=geometric_mean)
         rows += [
             (
-                outcome.trial.name,
+                outcome.trial.label,
                 int(size),
                 *(round(outcome.measured["clouds"][size][name], 2) for name in KEYS),
             )

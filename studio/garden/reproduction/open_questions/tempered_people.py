@@ -51,7 +51,9 @@ def _errors_shown(groups: dict[str, list[Tracked]]) -> Iterable[Part]:
             rows.append((half, kind, round(float(np.mean(ours)), 1), round(float(np.mean(theirs)), 1), *lost))
         if ratios:
             by_seed = [geometric_mean(np.array(one)) for one in zip(*ratios, strict=True)]
-            yield beyond(number(f"{half} half: error over the improved filter's", by_seed, "×"), ALLOWED, LOWER)
+            yield beyond(
+                number(f"{half} half: error over the improved filter's", by_seed, "×"), ALLOWED, LOWER
+            )
     heads = ("half", "clip", "tempered (mm)", "improved (mm)", "tempered, lost (%)", "improved, lost (%)")
     yield Table("Each clip", heads, tuple(rows))
     yield {"evaluations": EVALUATIONS, "weighting": WEIGHTING, "refined": "no"}
