@@ -335,8 +335,9 @@ function scheduleOfFrame(sheet, tables, at) {
   const sides = sidesOf(tables, at);
   const layers = layersOfAll(sides, "layers");
   const isNarrow = sheet.width < NARROW;
-  // Stored and tried are told apart by a legend of its own line, above all four.
-  const above = at.tried ? 18 : 0;
+  const has = (key) => sides.some((side) => side.tables.layers.some((row) => row[key] !== null));
+  // Stored and tried, or survival and moves, are told apart by a legend of its own line, above all four.
+  const above = at.tried || has("acceptance") ? 18 : 0;
   const whole = Math.max(120, at.room - 76 - above);
   const height = isNarrow ? Math.max(100, (at.room - 152 - above) / 2) : whole;
   const columns = sheet.columns(isNarrow ? 2 : 4, {
@@ -350,7 +351,6 @@ function scheduleOfFrame(sheet, tables, at) {
     top: above + (place < columns.length ? 0 : height + 76),
   }));
   const click = ({ dataIndex }) => ({ layer: layers[dataIndex] });
-  const has = (key) => sides.some((side) => side.tables.layers.some((row) => row[key] !== null));
   /** @param {[string, string, string, any][]} kinds name, key, colour of one side alone, style */
   const draw = (column, title, unit, y, kinds) => {
     const x = layerAxis(layers, at);
@@ -426,6 +426,7 @@ function scheduleOfFrame(sheet, tables, at) {
     });
   sheet.chosen(plot, { column: at.layer });
   if (at.tried) sheet.legend(["stored", "tried"], columns[0].left, 4, 160);
+  else if (has("acceptance")) sheet.legend(["reached", "moves taken"], columns[0].left, 4, 220);
   const words = sides.map(({ name, tables: own }) => {
     const row = own.layers.find((one) => one.layer === at.layer) ?? own.layers.at(-1);
     const what = `${layerWords(row.layer, at)}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}${Number.isFinite(row.largest) ? `, largest weight ${figure(100 * row.largest)} %` : ""}${sampledWords(row)}${row.alarm ? `. Alarm: ${row.alarm}` : ""}`;
@@ -437,7 +438,9 @@ function scheduleOfFrame(sheet, tables, at) {
 /** What a sampled posterior's layer says besides, with a comma before. */
 function sampledWords({ temper, acceptance, log_evidence: evidence }) {
   if (!Number.isFinite(temper)) return "";
-  const taken = Number.isFinite(acceptance) ? `, ${figure(100 * acceptance)} % of the moves taken` : "";
+  const taken = Number.isFinite(acceptance)
+    ? `, ${figure(100 * acceptance)} % of the moves taken`
+    : "";
   return `, exponent of the set ${figure(temper)}${taken}, log evidence ${figure(evidence)} nats`;
 }
 

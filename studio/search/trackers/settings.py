@@ -149,7 +149,7 @@ class TemperedSettings(SearchSettings):
     )
     particles: int = next_frame_knob(320, 2, 200000, 10, help="N: particles in every layer.")
     likelihood_scale: float = knob(
-        100.0, 0.001, 100000.0, 1.0, label="likelihood's scale",
+        150.0, 0.001, 100000.0, 1.0, label="likelihood's scale",
         help="T: the posterior's exponent of the likelihood, in which each pixel counts as if it erred alone.",
     )  # fmt: skip
     survival: float = knob(
