@@ -155,7 +155,7 @@ export function seriesOption(chart, width, selected) {
     series: [
       ...ground(chart),
       ...chart.series.flatMap((series) =>
-        (bars ? barParts : lineParts)(chart, series, known.get(groupOf(series))),
+        (chart.stacked ? stackedParts : bars ? barParts : lineParts)(chart, series, known.get(groupOf(series))),
       ),
     ],
   };
@@ -422,6 +422,21 @@ function band(chart, series, name, colour) {
  * Bars stand side by side; a thin series is dots on its group's bar; what the paper printed a
  * dashed stroke over it.
  */
+/** A bar's part, on those of the series before it; parts below zero hang from it. */
+function stackedParts(chart, series, group) {
+  return [
+    {
+      type: "bar",
+      stack: "parts",
+      name: legendName(chart, series),
+      data: series.x.map((x, index) => [x, usable(series.y[index], false)]),
+      barMaxWidth: 64,
+      barCategoryGap: "32%",
+      itemStyle: { color: token(group.colour) },
+    },
+  ];
+}
+
 function barParts(chart, series, group) {
   const colour = token(group.colour);
   const name = legendName(chart, series);

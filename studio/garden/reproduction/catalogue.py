@@ -27,6 +27,7 @@ from studio.garden.reproduction.experiment import TABLE, Experiment
 from studio.garden.reproduction.open_questions import (
     defaults,
     effort,
+    error_split,
     evaluations,
     generalisation,
     likelihood_scale,
@@ -67,6 +68,7 @@ MODULES = (
     sampled_posterior,
     tempered_people,
     likelihood_scale,
+    error_split,
     start_poses,
     defaults,
 )

@@ -49,7 +49,7 @@ class Heat:
 class Chart:
     """kind : one of KINDS. Axes carry their units: "error (mm)". categories : names along x for bars, whose x
     are 0, 1, 2, …. paper : a horizontal line at the paper's value. log_x, log_y : logarithmic axes. bands : spans
-    along x that are shaded, with a word each.
+    along x that are shaded, with a word each. stacked : bars stand on one another instead of side by side.
     """
 
     title: str
@@ -63,6 +63,7 @@ class Chart:
     log_x: bool = False
     log_y: bool = False
     bands: tuple[tuple[float, float, str], ...] = ()
+    stacked: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from studio.body.model import BodyModel
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError, RunError
@@ -148,7 +149,7 @@ def search_long(
     search = LongSearch(number, _stamp(frame), evaluations, weight, own, weight, origin, ())
     steps = max(FEWEST_STEPS, evaluations // SET)
     for at, (kind, start) in enumerate(starts):
-        scale = FIRST_STEP_MM * scale_of(run.body) * _parameters_a_mm(frame, start)
+        scale = FIRST_STEP_MM * scale_of(run.body) * parameters_a_mm(run.body, start)
         rng = np.random.default_rng((SEED, number, at))
 
         def told(done: int, before: int = at) -> None:
@@ -187,9 +188,9 @@ def points_apart(run: InspectedRun, one: Array, other: Array) -> float:
     return float(np.linalg.norm(points[0] - points[1], axis=1).mean())
 
 
-def _parameters_a_mm(frame: InspectedFrame, pose: Array) -> Array:
+def parameters_a_mm(body: BodyModel, pose: Array) -> Array:
     """(D,) what moves the body's points by a mm (RMS); at most a share of the parameter's range."""
-    body, small = frame.of.body, 1e-3
+    small = 1e-3
     moved = body_points(body, pose + small * np.eye(len(pose))) - body_points(body, pose[None])
     mm = np.sqrt(np.mean(np.sum(moved**2, axis=2), axis=1)) / small
     most = OF_RANGE * (body.upper - body.lower) / (FIRST_STEP_MM * scale_of(body))
