@@ -114,7 +114,7 @@ def inference_data(datasets: Sequence[Any]) -> Any:  # noqa: ANN401 - of xarray.
     seeds = [one.attrs["seed"] for one in datasets]
     clouds = [_last_clouds(one) for one in datasets]
     coords = {"chain": np.arange(len(datasets)), "seed": ("chain", seeds)}
-    across = {"frame": first["frame"], "draw": np.arange(first.sizes["particle"])}
+    across: dict[str, Any] = {"frame": first["frame"], "draw": np.arange(first.sizes["particle"])}
     dims = ("chain", "draw", "frame")
     return arviz.InferenceData(
         warn_on_custom_groups=False,
@@ -138,7 +138,7 @@ def inference_data(datasets: Sequence[Any]) -> Any:  # noqa: ANN401 - of xarray.
 def _last_clouds(dataset: Any) -> tuple[Array, Array, Array, Array]:  # noqa: ANN401 - xarray.Dataset
     """Of each frame's last layer N draws: poses (N, K, D), log w (N, K) and weights (N, K); log evidence (K,)."""
     poses, logs, betas = (dataset[name].to_numpy() for name in ("pose", "log_weight", "beta"))
-    count, frames = poses.shape[2], len(poses)
+    count, frames = int(poses.shape[2]), len(poses)
     clouds = np.empty((count, frames, poses.shape[3]))
     lp, weight, evidence = np.empty((count, frames)), np.empty((count, frames)), np.empty(frames)
     for at in range(frames):

@@ -171,7 +171,9 @@ class TemperedFilter(ParticleFilter[TemperedSettings]):
             first = np.arange(len(moved.poses))
             if annealed.beta > 0.0:
                 first = draw(numbers, np.exp(annealed.log_weights), len(first), settings.resampling)
-            survivors = _Moved(*(values[first] for values in moved[:4]))
+            survivors = _Moved(
+                moved.poses[first], moved.raw[first], moved.eligible[first], moved.prior[first]
+            )
             following = _propose_moves(numbers, survivors, weighted, climbed, space, settings)
             following.extra.update(prior.arrays)
             kept, diffused = moments(survivors.poses).variance, moments(following.poses).variance
@@ -322,6 +324,6 @@ def _log_normal(poses: Array, normal: Spread) -> Array:
     """
     assert normal.root is not None
     varied = np.flatnonzero(np.diag(normal.root) > 0.0)
-    away = (poses - normal.centres[0])[:, varied] / normal.deviation[varied]
-    standard = solve_triangular(normal.root[np.ix_(varied, varied)], away.T, lower=True)
-    return -0.5 * np.sum(standard * standard, axis=0)
+    away: Array = (poses - normal.centres[0])[:, varied] / normal.deviation[varied]
+    standard: Array = solve_triangular(normal.root[np.ix_(varied, varied)], away.T, lower=True)
+    return -0.5 * np.sum(standard**2, axis=0)

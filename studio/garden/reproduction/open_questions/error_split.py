@@ -2,9 +2,9 @@
 
 Parts as in `results.inspection.error_parts`, nothing refined: the search's is what the error would lose were the
 heaviest known pose of the frame found; the likelihood's how much farther off that pose is than the body laid on the
-truth; the body's what is left. The heaviest known pose is that of long climbs (`results.inspection.long_search.climb`) from the
-truth and from what two filters with 20 000 evaluations find from the frame before, or a tracker's own pose where that
-weighs more.
+truth; the body's what is left. The heaviest known pose is that of long climbs (`results.inspection.long_search`) from
+the truth and from what two filters with 20 000 evaluations find from the frame before, or a tracker's own pose where
+that weighs more.
 """
 
 import dataclasses

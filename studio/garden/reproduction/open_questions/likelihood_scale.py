@@ -71,7 +71,7 @@ def share_nearer(points: Array, weights: Array, truth: Array) -> Array:
     """
     mean = np.tensordot(weights, points, axes=1)
     away, off = points - mean, truth - mean
-    covariance = np.einsum("n,nmi,nmj->mij", weights, away, away) + RIDGE_MM**2 * np.eye(3)
+    covariance: Array = np.einsum("n,nmi,nmj->mij", weights, away, away) + RIDGE_MM**2 * np.eye(3)
     inverse = np.linalg.inv(covariance)
     own = np.einsum("nmi,mij,nmj->nm", away, inverse, away)
     return weights @ (own < np.einsum("mi,mij,mj->m", off, inverse, off))

@@ -103,7 +103,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     for at in range(int(arguments["poses"])):
         rng = np.random.default_rng((seed, at, 31))
         truth = rng.uniform(arm.space.lower, arm.space.upper)
-        problem, last = turned_over(arm, truth, rng), []
+        problem, last = turned_over(arm, truth, rng), list[LayerRecord]()
         result = search_frame(
             tracker,
             problem,
@@ -135,7 +135,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for outcome in outcomes:
         groups.setdefault(group_of(outcome.trial), []).append(outcome.measured)
-    rows = []
+    rows = list[tuple[Any, ...]]()
     for group, entries in groups.items():
         ranks = np.concatenate([np.array(one["ranks"]) for one in entries])
         names, count = entries[0]["parameters"], len(ranks)
@@ -151,7 +151,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
             rows.append(
                 (group, name, count, round(away, 3), round(band(count), 3), one, round(100.0 * far, 1))
             )
-        yield number(f"{group}: moves taken at the end", [np.mean(one["taken"]) for one in entries], "of 1")
+        yield number(
+            f"{group}: moves taken at the end", [float(np.array(one["taken"]).mean()) for one in entries], "of 1"
+        )
         series = [
             Series(name, LEVELS, tuple(distribution(ranks[:, d]).tolist())) for d, name in enumerate(names)
         ]
@@ -219,7 +221,8 @@ def measure_people(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
     problem = likelihood.problem(_seen(cache, session, cameras, last, settings))
     before, scale = run.carried, float(settings.tracker.likelihood_scale)
     chains = chains_of(problem, before, space, scale, int(arguments["seed"]), int(arguments["generations"]))
-    middle, deviation = chains.mean(axis=0), np.maximum(chains.std(axis=0), 1e-12)
+    middle: Array = chains.mean(axis=0)
+    deviation: Array = np.maximum(chains.std(axis=0), 1e-12)
     clouds = dict[str, dict[str, float]]()
     for size in arguments["sizes"]:
         knobs = dataclasses.replace(settings.tracker, **knobs_for_evaluations("tempered", int(size)))
@@ -238,14 +241,15 @@ def measure_people(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
         assert cloud is not None
         weights = np.exp(cloud.log_weights)
         mean = weights @ cloud.poses
-        spread = np.sqrt(weights @ (cloud.poses - mean) ** 2)
+        spread: Array = np.sqrt(weights @ (cloud.poses - mean) ** 2)
         clouds[str(size)] = {
             "off": float(np.sqrt(np.mean(((mean - middle) / deviation) ** 2))),
             "spread": float(np.exp(np.mean(np.log(np.maximum(spread, 1e-12) / deviation)))),
             "log_evidence": float(records[-1].log_evidence),
         }
-    halves = [half.mean(axis=0) for half in np.array_split(chains, 2)]
-    agreement = float(np.sqrt(np.mean(((halves[0] - halves[1]) / deviation) ** 2)))
+    half = len(chains) // 2
+    apart: Array = (chains[:half].mean(axis=0) - chains[half:].mean(axis=0)) / deviation
+    agreement = float(np.sqrt(np.mean(apart**2)))
     return {"clouds": clouds, "chains_apart": agreement}
 
 

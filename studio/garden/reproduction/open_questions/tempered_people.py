@@ -12,7 +12,7 @@ from studio.garden.drawn_recipes import HALVES, REPORTING, clip_name
 from studio.garden.reproduction.claims import LOWER, beyond, geometric_mean, percent
 from studio.garden.reproduction.experiment import Part
 from studio.garden.reproduction.tracking import Candidate, Line, lost_percent, mean_errors, tracked_experiment
-from studio.results.comparison.findings import Table
+from studio.results.comparison.findings import Plain, Table
 from studio.results.comparison.statistics import number
 from studio.results.comparison.tracked import Tracked
 
@@ -38,7 +38,7 @@ def _error_lines(quick: bool) -> Iterator[Line]:
 
 def _errors_shown(groups: dict[str, list[Tracked]]) -> Iterable[Part]:
     """By half the ratio of the errors over its clips, and each clip's."""
-    rows = list[tuple[str, str, float, float, float, float]]()
+    rows = list[tuple[Plain, ...]]()
     for half in HALVES:
         ratios = list[list[float]]()
         for kind in KINDS:
@@ -69,7 +69,7 @@ def _body_lines(quick: bool) -> Iterator[Line]:
 
 def _bodies_shown(groups: dict[str, list[Tracked]]) -> Iterable[Part]:
     """In how many clips the true body has more evidence, mean over the seeds."""
-    rows, ahead = list[tuple[str, float, float, float]](), list[bool]()
+    rows, ahead = list[tuple[Plain, ...]](), list[bool]()
     for kind in KINDS:
         pair = [groups.get(f"{name}, {kind}", []) for name in (TRUE, LARGE)]
         if not all(pair):
