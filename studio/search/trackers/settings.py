@@ -144,6 +144,9 @@ class TemperedSettings(SearchSettings):
 
     title = "Tempered sequential Monte Carlo"
 
+    # The annealed filter's later layers take its cloud beyond σ0; a prior's density does not. On five clips of the
+    # choosing half 1.5 errs as much as 1 or less (43 -> 32 mm on the kick), with more evidence where motion is fast.
+    diffusion_scale: float = with_default(SearchSettings, "diffusion_scale", 1.5)
     layers: int = next_frame_knob(
         16, 2, 1000, 1, help="Layers in a frame: those that climb the ladder, and moves at its end."
     )

@@ -13,6 +13,7 @@ from studio.garden.reproduction.open_questions import sampled_posterior as sampl
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.kept_trials import plain
 from studio.results.comparison.trials import Outcome, Scale, Trial
+from studio.search.trackers.frame_prior import FramePrior
 from studio.search.trackers.tracker import FilterState, Hierarchy, ParticleSet, SearchSpace
 
 SAMPLES = Path(__file__).parents[3] / "sample_sessions"
@@ -88,7 +89,8 @@ def test_the_chains_find_a_normal_posterior() -> None:
         Hierarchy(whole, whole == 0, whole, np.full(size, -1)),
     )
     before = FilterState(ParticleSet(np.zeros((1, size)), np.zeros(1)))
-    poses = sampled.chains_of(_Bowl(), before, space, 1.0, 3, 1200)
+    prior = FramePrior.of_frame(before, space, scale=1.0, dynamics="none", bounded=True)
+    poses = sampled.chains_of(_Bowl(), prior, 1.0, 3, 1200)
     variance = 1.0 / (1.0 / 0.25 + 1.0 / 0.04)
     assert np.allclose(poses.mean(axis=0), 0.3 * variance / 0.04, atol=0.02)
     assert np.allclose(poses.var(axis=0), variance, rtol=0.12)

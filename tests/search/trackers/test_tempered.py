@@ -40,7 +40,7 @@ def searched(
     problem: Bowl, space: SearchSpace, last: ParticleSet | None, seed: int, **knobs: object
 ) -> tuple[FrameResult, list[LayerRecord]]:
     """One frame."""
-    settings = TemperedSettings(**{"likelihood_scale": 1.0, **knobs})
+    settings = TemperedSettings(**{"likelihood_scale": 1.0, "diffusion_scale": 1.0, **knobs})
     records: list[LayerRecord] = []
     result = search_frame(
         TRACKER,

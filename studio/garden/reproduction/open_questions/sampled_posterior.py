@@ -41,7 +41,7 @@ from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.search.trackers.frame_loop import search_frame
 from studio.search.trackers.frame_prior import FramePrior
 from studio.search.trackers.random_numbers import RandomNumbers
-from studio.search.trackers.tracker import FilterState, LayerRecord, SearchSpace, start_of
+from studio.search.trackers.tracker import FilterState, LayerRecord, start_of
 from studio.sessions.session import Session
 
 ARM_BODIES = ("planar_arm4", "branched_arms6")
@@ -152,7 +152,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
                 (group, name, count, round(away, 3), round(band(count), 3), one, round(100.0 * far, 1))
             )
         yield number(
-            f"{group}: moves taken at the end", [float(np.array(one["taken"]).mean()) for one in entries], "of 1"
+            f"{group}: moves taken at the end",
+            [float(np.array(one["taken"]).mean()) for one in entries],
+            "of 1",
         )
         series = [
             Series(name, LEVELS, tuple(distribution(ranks[:, d]).tolist())) for d, name in enumerate(names)
@@ -219,8 +221,11 @@ def measure_people(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
     for frame in range(last):
         run.step(frame, likelihood.problem(_seen(cache, session, cameras, frame, settings)))
     problem = likelihood.problem(_seen(cache, session, cameras, last, settings))
-    before, scale = run.carried, float(settings.tracker.likelihood_scale)
-    chains = chains_of(problem, before, space, scale, int(arguments["seed"]), int(arguments["generations"]))
+    before, own = run.carried, settings.tracker
+    prior = FramePrior.of_frame(before, space, scale=own.diffusion_scale, dynamics=own.dynamics, bounded=True)
+    chains = chains_of(
+        problem, prior, own.likelihood_scale, int(arguments["seed"]), int(arguments["generations"])
+    )
     middle: Array = chains.mean(axis=0)
     deviation: Array = np.maximum(chains.std(axis=0), 1e-12)
     clouds = dict[str, dict[str, float]]()
@@ -254,18 +259,12 @@ def measure_people(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
 
 
 def chains_of(
-    problem: FrameLikelihood,
-    before: FilterState,
-    space: SearchSpace,
-    scale: float,
-    seed: int,
-    generations: int,
+    problem: FrameLikelihood, prior: FramePrior, scale: float, seed: int, generations: int
 ) -> Array:
     """(K, D) poses of the posterior, of CHAINS chains of differential evolution (ter Braak 2006) that begin in the
     prior; each half moves by differences of the other's members. The first half of the generations is left out.
     """
-    prior = FramePrior.of_frame(before, space, scale=1.0, dynamics="none", bounded=True)
-    poses, size = prior.draw(RandomNumbers.of_beginning(seed, 0), CHAINS), len(space.names)
+    poses, size = prior.draw(RandomNumbers.of_beginning(seed, 0), CHAINS), len(prior.deviation)
     rng = np.random.default_rng((seed, 77))
 
     def log_posterior(rows: Array) -> Array:
@@ -280,7 +279,7 @@ def chains_of(
         for own, other in (halves, halves[::-1]):
             pairs = np.array([rng.choice(other, 2, replace=False) for _ in own])
             moved = poses[own] + step * (poses[pairs[:, 0]] - poses[pairs[:, 1]])
-            moved += LITTLE * space.sigma * rng.normal(size=moved.shape)
+            moved += LITTLE * prior.deviation * rng.normal(size=moved.shape)
             proposed = log_posterior(moved)
             taken = np.log(rng.random(len(own))) < proposed - weights[own]
             poses[own[taken]], weights[own[taken]] = moved[taken], proposed[taken]
