@@ -47,9 +47,9 @@ from studio.sessions.session import Session
 ARM_BODIES = ("planar_arm4", "branched_arms6")
 TURNED = 0.3
 """Probability ε of a pixel to be turned over."""
-POSES, QUICK_POSES = 30, 6
+POSES, QUICK_POSES = 20, 4
 """A seed's simulated pictures."""
-KNOBS: Mapping[str, Any] = {"layers": 80, "particles": 200, "survival": 0.7}
+KNOBS: Mapping[str, Any] = {"layers": 60, "particles": 400, "survival": 0.7}
 RIGHT = "the density's scale"
 SCALES: Mapping[str, float] = {RIGHT: 1.0, "four times too large": 4.0, "four times too small": 0.25}
 
