@@ -14,13 +14,13 @@ ladder of exponents 0 = t_0 < t_1 < … ≤ T leads there (Neal 2001; Del Moral,
    is one of three kinds, by chance alone:
    - a step of the whole body, mean + √(1 - s²) (x - mean) + s times noise with the set's mean and covariance. It is
      reversible for the normal density that has these, so that a posterior which is nearly normal takes even s = 1,
-     however many parameters there are (Kantas, Beskos & Jasra 2014, section 4.2); a walk, which has no pull to the
-     mean, needed ten times as many layers on a normal posterior of 34 parameters;
+     however many parameters there are (Kantas, Beskos & Jasra 2014, section 4.2). Of a normal posterior of 34
+     parameters it left means 0.12 deviations off after 50 layers of 400, a walk without the pull to the mean 0.5;
    - a walk of one limb with the set's covariance;
    - an exchange of neighbouring limbs between two particles (cut as in Eq. 19), both or neither.
    s and the walk's width grow and shrink by the share that was taken in the layer before. Mean and covariance are those
-   of the weighted set, in which no particle stands twice; that they are of the set itself shifts results by some
-   parameters / particles.
+   of the weighted set, in which fewer particles stand twice than among the survivors; that they are of the set itself
+   shifts results by some parameters / particles.
 4. Layers that are left at the end of the ladder move the set only. A last layer that has not reached the end takes the
    rest of the way as weights.
 
