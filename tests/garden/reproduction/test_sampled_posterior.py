@@ -55,8 +55,8 @@ def test_a_picture_is_measured_and_wrong_scales_are_told_from_right_ones() -> No
         for seed in range(8)
     ]
     numbers = {part.name: part for part in sampled.shown(outcomes) if hasattr(part, "verdict")}
-    right = numbers[f"{sampled.RIGHT}, planar_arm4: parameters with uniform ranks"]
-    wrong = numbers["four times too large, planar_arm4: parameters with uniform ranks"]
+    right = numbers[f"{sampled.RIGHT}: parameters with uniform ranks"]
+    wrong = numbers["four times too large: parameters with uniform ranks"]
     assert (right.ours, wrong.ours) == (1.0, 0.0)
 
 
