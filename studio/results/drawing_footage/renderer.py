@@ -33,6 +33,8 @@ from studio.results.drawing_footage.wardrobes import STRIPED
 SHADOW_REACH, SHADOW_CELL = 2600.0, 26.0
 EXPOSURE, LENS_BLUR = 1.8, 0.55
 STREAMS_PER_FRAME = 64
+LIGHTEST, FAR_AWAY = 252.0, 1e6
+"""Grey level that the lightest pixel of a picture in place of the room has; its distance, mm."""
 MOMENTS = 5
 """Number of moments averaged over an exposure. The shadow is that of the middle one."""
 
@@ -186,6 +188,58 @@ class SurfaceRenderer(Renderer):
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
 
+class RendererBefore(Renderer):
+    """Renders a surface of swept spheres before pictures of an empty place, one a camera; it throws no shadow."""
+
+    def __init__(
+        self,
+        pictures: Sequence[NDArray[np.floating] | Bytes],
+        cameras: tuple[Camera, ...],
+        tables: Array,
+        labels: NDArray[np.int64],
+        *,
+        lights: Array,
+        noise: float,
+        samples: int,
+        seed: int,
+        wardrobe: Array = STRIPED,
+    ) -> None:
+        """pictures : (H, W, 3) BGR grey levels. tables, labels : (F, P, COLUMNS) and (P, 2) of `flesh.piece_tables`.
+        lights : of a `Room`.
+        """
+        self._room = Room((0.0, 0.0), 0.0, (), lights)
+        self._noise, self._samples, self._seed = noise, samples, seed
+        self._wardrobe, self._moments = wardrobe, 1
+        self._tables, self._labels = tables[:, None], labels
+        self._views = tuple(
+            _view_before(camera, samples, picture) for camera, picture in zip(cameras, pictures, strict=True)
+        )
+        self._empty = [np.clip(np.rint(picture), 0, 255).astype(np.uint8) for picture in pictures]
+
+    @property
+    def frame_count(self) -> int:
+        return len(self._tables)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The cameras' names."""
+        return tuple(view.camera.name for view in self._views)
+
+    def seen(self, camera: int, frame: int) -> tuple[Bytes, Bytes]:
+        """(H, W, 3) BGR picture and (H, W) mask, 255 where the surface covers half a pixel or more. Around the surface
+        the picture has the sensor's noise, elsewhere it is that of the empty place.
+        """
+        view, table = self._views[camera], self._tables[frame, 0]
+        picture, mask = self._empty[camera].copy(), np.zeros(view.depth.shape, np.uint8)
+        window = _window(view.camera, table)
+        if window is not None:
+            surface, coverage = self._person(view, table, *window)
+            light = view.key[window] * (1.0 - coverage[..., None]) + surface
+            picture[window] = self._developed(light, camera, frame)
+            mask[window] = np.where(coverage >= 0.5, 255, 0)
+        return picture, mask
+
+
 def _moments(motion: PersonMotion, shutter: float) -> PersonMotion:
     """The motion at the MOMENTS of each frame's exposure, one after the other."""
     within = shutter * ((np.arange(MOMENTS) + 0.5) / MOMENTS - 0.5)
@@ -210,6 +264,16 @@ def _view(room: Room, camera: Camera, samples: int) -> _View:
     return _View(
         camera, rays, key.astype(single), ambient.astype(single), depth.astype(single), places.astype(single)
     )
+
+
+def _view_before(camera: Camera, samples: int, picture: NDArray[np.floating] | Bytes) -> _View:
+    """A camera's constant data where a picture (H, W, 3), BGR grey levels, stands for the room."""
+    shape = (camera.height, camera.width)
+    levels = np.clip(np.asarray(picture, np.float32)[..., ::-1], 0.0, LIGHTEST)
+    light = np.ascontiguousarray(-np.log(1.0 - levels / np.float32(255.0)) / np.float32(EXPOSURE))
+    depth = np.full(shape, FAR_AWAY, np.float32)
+    nothing = np.zeros((0, 0, 2), np.float32)
+    return _View(camera, pixel_rays(camera, samples), light, nothing, depth, nothing)
 
 
 def _at_places(grid: Floats, places: Floats) -> Floats:

@@ -12,6 +12,7 @@ The mean error, the bias, is learnt from these errors, too. What is left without
 block without the bias that this block has helped to learn.
 """
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -51,7 +52,7 @@ def _alike(values: Array) -> float:
 def blocks_of(count: int, length: int) -> tuple[slice, ...]:
     """`count` frames in blocks of at least `length`, as even as can be."""
     edges = np.linspace(0, count, max(1, count // length) + 1).round().astype(np.int64).tolist()
-    return tuple(slice(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True))
+    return tuple(slice(first, last) for first, last in itertools.pairwise(edges))
 
 
 def half_widths(scores: Array, blocks: Sequence[slice], levels: Sequence[float] = LEVELS) -> Array:

@@ -1,5 +1,7 @@
 """Half widths from errors that are alike in neighbouring frames: blocks hold the promise, single frames do not."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -49,7 +51,7 @@ def test_blocks_hold_the_promise_where_single_frames_do_not() -> None:
 
 def of_blocks(*blocks: list[float], level: float) -> float:
     edges = np.cumsum([0, *map(len, blocks)]).tolist()
-    parts = [slice(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [slice(first, last) for first, last in itertools.pairwise(edges)]
     return float(half_widths(np.concatenate(blocks)[:, None], parts, [level])[0, 0])
 
 

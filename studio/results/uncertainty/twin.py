@@ -1,0 +1,328 @@
+"""A run's twin: the run drawn as footage of its own, tracked as it was tracked, and the errors there.
+
+The twin's body moves as the run's poses say, before the same cameras in the same empty place. A person is drawn clothed
+(`twin_person.py`), any other body with the surface of its cones. The masks are the drawn ones with the faults of the
+run's own (`mask_faults.py`), of frames a third of the run away. What the run was given it is given, too: settings as
+they changed, σ0, start pose, behaviour model, corrected sides, and a shape fitted to its first frames where the run's
+was. Of the truth, if the session has one, nothing is read.
+"""
+
+import shutil
+import tempfile
+from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from cachetools import LRUCache
+
+from studio.body.dimensions import with_dimensions
+from studio.body.forward_kinematics import joint_frames
+from studio.body.model import BodyModel
+from studio.body.person import marker_motion
+from studio.body.scale import scale_of
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.pipeline import EvidenceMaker
+from studio.footage.capture.footage import Footage
+from studio.foundations.arrays import Array, Bytes, evenly_spread
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.knobs import Value
+from studio.foundations.progress import Progress
+from studio.results.drawing_footage.body_footage import body_pieces
+from studio.results.drawing_footage.flesh import IntArray, clothed_pieces, piece_tables
+from studio.results.drawing_footage.renderer import RendererBefore
+from studio.results.drawing_footage.rooms import OFFICE_LIGHTS
+from studio.results.inspection.reading import InspectedRun
+from studio.results.inspection.reference import body_points
+from studio.results.uncertainty.mask_faults import FaultShares, MaskFaults
+from studio.results.uncertainty.twin_person import is_person, person_of_poses
+from studio.runs.drawing.overlay_drawing import projected_silhouette
+from studio.runs.problem_source import ProblemSource
+from studio.runs.setup.shape_on_the_way import FIRST_FRAMES, LEAST_OVERLAP, shaped_body
+from studio.runs.sides import correct_clip
+from studio.runs.tracking_run import TrackingRun
+from studio.runs.tracks import SIDES, Track, best_track, read_track
+from studio.search.likelihood.overlay import limb_contours
+from studio.search.settings import default_settings, settings_from_values
+from studio.sessions.results_store import ResultsWriter, create_store
+from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, write_run_record
+from studio.sessions.stored_run import BODY_FOLDER, StoredRun
+
+SEED = 9001
+"""Added to the run's: its twin draws other random numbers."""
+AWAY = 1.0 / 3.0
+"""Share of the run from which the faults of a frame's masks come."""
+SAMPLES, NOISE = 2, 2.5
+"""Rays along a pixel's side, and the sensor's noise, grey levels."""
+GIRTHS, GIRTH_FRAMES, GIRTH_LIMITS = (0.9, 1.1), 4, (0.6, 1.6)
+KEPT_BYTES = 64 << 20
+"""Drawn pictures with their masks that are kept."""
+OWN_MASKS: Mapping[str, Value] = {
+    "background_model": "mask",
+    "mask_clean_given": False,
+    "hull_evidence": "masks",
+    "record_particles": 0,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwinErrors:
+    """Of a twin's F frames and M points. errors : (F, M, 3) mm, reported less true. turns : (F, M, 3, 3) axes of the
+    joint that carries each point, as reported. faults : what was wrong with the masks.
+    """
+
+    errors: Array
+    turns: Array
+    faults: tuple[FaultShares, ...]
+
+
+class TwinFootage(Footage):
+    """What a renderer draws, under the frame numbers of a run, with masks that have faults."""
+
+    def __init__(self, own: Footage, renderer: RendererBefore, first: int, faults: MaskFaults) -> None:
+        """own : the run's footage, whose cameras and excluded areas hold here as well. first : its first frame."""
+        super().__init__(own.source, own.folder)
+        self._renderer, self._first, self._given = renderer, first, faults
+        self._count = renderer.frame_count
+        self._views = {name: at for at, name in enumerate(renderer.names)}
+        size = max(5 * camera.width * camera.height for camera in own.source.cameras)
+        self._drawn = LRUCache[tuple[str, int], tuple[Bytes, Bytes]](
+            max(2 * len(self._views), KEPT_BYTES // size)
+        )
+
+    def picture(self, camera: str, frame: int) -> Bytes:
+        return self._seen(camera, frame)[0]
+
+    def mask(self, camera: str, frame: int) -> Bytes | None:
+        return self._seen(camera, frame)[1]
+
+    def has_masks(self, camera: str) -> bool:
+        return True
+
+    def hidden(self, camera: str, frame: int) -> Bytes | None:
+        return None
+
+    def absent(self, frame: int) -> frozenset[str]:
+        return frozenset()
+
+    def _seen(self, camera: str, frame: int) -> tuple[Bytes, Bytes]:
+        key = camera, frame
+        seen = self._drawn.get(key)
+        if seen is None:
+            view, at = self._views[camera], frame - self._first
+            picture, mask = self._renderer.seen(view, at)
+            source = (at + round(AWAY * self._count)) % self._count
+            seen = self._drawn[key] = picture, self._given.given_to(mask, view, at, source)
+        return seen
+
+
+def points_of(body: BodyModel) -> tuple[str, ...]:
+    """(M,) names of the body's points: its markers, or its limbs, whose far ends are meant, where it has none."""
+    return tuple(one.name for one in (body.markers or body.drawn))
+
+
+def track_twin(run: InspectedRun, frames: range, progress: Progress) -> TwinErrors:
+    """Draw and track a run's twin. frames : of the run, each with a pose. What a progress raises ends it."""
+    record, body = run.run.record, run.body
+    poses = reported(run.run).poses[: len(frames)]
+    with ExitStack() as open_things:
+        own = open_things.enter_context(closing(run.session.footage()))
+        cameras = run.run.cameras()
+        backgrounds = Backgrounds(own)
+        faults = _measured(run, frames, poses, cameras, own, backgrounds, progress)
+        pictures = [backgrounds.model(camera.name, "gaussian").mean for camera in cameras]
+        renderer, truth = _drawn(body, poses, cameras, pictures, record.fps, record.seed)
+        del backgrounds
+        footage = open_things.enter_context(closing(TwinFootage(own, renderer, frames.start, faults)))
+        twin = open_things.enter_context(_prepared(run, frames, footage, progress))
+        ahead = open_things.enter_context(ThreadPoolExecutor(1, thread_name_prefix="next-frame"))
+        problems = ProblemSource(
+            run.session, twin.body(), cameras, last=frames.stop, executor=ahead, footage=footage
+        )
+        with closing(problems):
+            _track(twin, problems, progress)
+        found = reported(twin).poses
+        errors = body_points(twin.body(), found) - truth
+        turns = joint_frames(twin.body(), found)[:, _carriers(body), :, :3]
+    return TwinErrors(errors, turns, faults.shares())
+
+
+def reported(run: StoredRun) -> Track:
+    """The run's track with its sides put right, if anything was; else the search's own."""
+    return read_track(run, best_track(run, (SIDES,)).name)
+
+
+def _measured(
+    run: InspectedRun,
+    frames: range,
+    poses: Array,
+    cameras: tuple[Camera, ...],
+    footage: Footage,
+    backgrounds: Backgrounds,
+    progress: Progress,
+) -> MaskFaults:
+    """The faults of the run's own masks."""
+    faults, makers = MaskFaults(run.body, cameras, poses), dict[object, EvidenceMaker]()
+    for at, frame in enumerate(frames):
+        progress("what the masks get wrong", at, len(frames))
+        settings = run.settings(frame).evidence
+        maker = makers.setdefault(settings, EvidenceMaker(cameras, footage, backgrounds, settings, "none"))
+        faults.measure(at, {view.camera: view.mask for view in maker.evidence(frame).views})
+    return faults
+
+
+def _drawn(
+    body: BodyModel,
+    poses: Array,
+    cameras: tuple[Camera, ...],
+    pictures: list[Array] | list[Bytes],
+    fps: float,
+    seed: int,
+) -> tuple[RendererBefore, Array]:
+    """What draws a body in poses (F, D), and where its points then are, (F, M, 3) mm."""
+    truth, scale = body_points(body, poses), scale_of(body)
+    if is_person(body):
+        motion = person_of_poses(body, poses, fps)
+        markers, names = marker_motion(motion), points_of(body)
+        truth[:, [names.index(name) for name in markers.names]] = markers.positions
+
+        def surface(girth: float) -> tuple[Array, IntArray]:
+            return piece_tables(motion, clothed_pieces(motion.skeleton, girth))
+
+        tables, labels = surface(_girth(body, poses, cameras, pictures, surface))
+    else:
+        tables, labels = body_pieces(body, poses, 1.0 / scale)
+    return _renderer(cameras, pictures, tables, labels, scale, SAMPLES, seed + SEED), truth
+
+
+def _renderer(
+    cameras: tuple[Camera, ...],
+    pictures: list[Array] | list[Bytes],
+    tables: Array,
+    labels: IntArray,
+    scale: float,
+    samples: int,
+    seed: int,
+) -> RendererBefore:
+    """scale : of the body beside a person. A small one is drawn larger, before cameras that are so much farther off."""
+    enlarged = tuple(replace(camera, translation=camera.translation / scale) for camera in cameras)
+    return RendererBefore(
+        pictures, enlarged, tables, labels, lights=OFFICE_LIGHTS, noise=NOISE, samples=samples, seed=seed
+    )
+
+
+def _girth(
+    body: BodyModel,
+    poses: Array,
+    cameras: tuple[Camera, ...],
+    pictures: list[Array] | list[Bytes],
+    surface: Callable[[float], tuple[Array, IntArray]],
+) -> float:
+    """The girth with which a person covers as much of the pictures as the body's cones do."""
+    rows = evenly_spread(len(poses), GIRTH_FRAMES)
+    wanted = sum(
+        int(np.count_nonzero(projected_silhouette(contours, camera.height, camera.width)))
+        for row in rows
+        for camera, contours in zip(cameras, limb_contours(body, cameras, poses[row]), strict=True)
+    )
+    areas: list[int] = []
+    for girth in GIRTHS:
+        tables, labels = surface(girth)
+        drawn = _renderer(cameras, pictures, tables[rows], labels, 1.0, 1, 0)
+        areas.append(
+            sum(
+                int(np.count_nonzero(drawn.seen(view, at)[1]))
+                for at in range(len(rows))
+                for view in range(len(cameras))
+            )
+        )
+    low, high = GIRTHS
+    slope = (areas[1] - areas[0]) / (high - low)
+    girth = low + (wanted - areas[0]) / slope if slope > 0.0 else 1.0
+    return float(np.clip(girth, *GIRTH_LIMITS))
+
+
+def _carriers(body: BodyModel) -> list[int]:
+    """(M,) the joint that carries each of the body's points: of one at its joint's origin the joint above."""
+    carriers: list[int] = []
+    if not body.markers:
+        return [limb.joint for limb in body.drawn]
+    for marker in body.markers:
+        above = body.joints[marker.joint].parent
+        carriers.append(above if above >= 0 and not np.any(marker.offset) else marker.joint)
+    return carriers
+
+
+@contextmanager
+def _prepared(
+    run: InspectedRun, frames: range, footage: TwinFootage, progress: Progress
+) -> Generator[StoredRun]:
+    """The twin as a run of its own, ready to be tracked, in a folder that is removed at the end."""
+    record, body = run.run.record, run.body
+    start = record.start_pose
+    if record.subject_dimensions and start is not None:
+        body, start = _shaped(run, frames, footage, progress)
+    with tempfile.TemporaryDirectory(prefix="studio-twin-") as folder, run.run.results() as results:
+        place = Path(folder) / "twin" / "runs" / "twin"
+        place.mkdir(parents=True)
+        for part in (CAMERAS_NAME, BEHAVIOUR_NAME):
+            if (run.run.folder / part).exists():
+                shutil.copyfile(run.run.folder / part, place / part)
+        if (run.run.folder / BODY_FOLDER).is_dir():
+            shutil.copytree(run.run.folder / BODY_FOLDER, place / BODY_FOLDER)
+        create_store(place)
+        changed = msgspec.structs.replace(
+            record,
+            last=frames.stop,
+            seed=record.seed + SEED,
+            settings={**record.settings, **OWN_MASKS},
+            dimensions=dict(body.dimensions),
+            start_pose=start,
+            made_from="",
+            notes=(),
+        )
+        write_run_record(place, changed)
+        with closing(ResultsWriter(place)) as writer:
+            for entry in results.settings_history():
+                writer.write_settings(entry.version, entry.frame, entry.layer, {**entry.values, **OWN_MASKS})
+        yield StoredRun(place, changed)
+
+
+def _shaped(
+    run: InspectedRun, frames: range, footage: TwinFootage, progress: Progress
+) -> tuple[BodyModel, tuple[float, ...]]:
+    """The body with the shape of the twin's first frames, as the run's own was fitted, and its start pose."""
+    record = run.run.record
+    assert record.start_pose is not None
+    body = with_dimensions(run.body, record.subject_dimensions)
+    recorded = settings_from_values(record.tracker, record.weighting, {**record.settings, **OWN_MASKS})
+    rules = replace(default_settings(), evidence=recorded.evidence)
+    problems = ProblemSource(run.session, body, run.run.cameras(), footage=footage)
+    # The footage goes on; what the source has read of it is let go with the source.
+    shape = shaped_body(
+        body,
+        problems.cameras,
+        lambda frame: problems.evidence(frame, rules),
+        frames[:FIRST_FRAMES],
+        np.array(record.start_pose),
+        np.array(record.sigma),
+        progress=lambda step, done, total: progress(f"{step} of the twin", done, total),
+    )
+    before, after = shape.overlap
+    if after < max(LEAST_OVERLAP, before):
+        return body, record.start_pose
+    return shape.body, tuple(float(value) for value in shape.start)
+
+
+def _track(twin: StoredRun, problems: ProblemSource, progress: Progress) -> None:
+    record = twin.record
+    with closing(TrackingRun(twin, problems)) as tracking:
+        while not tracking.finished:
+            progress("tracking the twin", tracking.done, record.frame_count)
+            tracking.step_layer()
+    correct_clip(
+        twin, problems, lambda _: progress("tracking the twin", record.frame_count, record.frame_count)
+    )
