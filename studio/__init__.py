@@ -24,7 +24,7 @@ _VERBS = {
     ),
     "studio.operations.foreign": ("inspect",),
     "studio.operations.gallery": ("gallery",),
-    "studio.operations.inspecting": ("compare_runs", "seeds", "split_error", "view", "why"),
+    "studio.operations.inspecting": ("compare_runs", "seeds", "split_error", "uncertainty", "view", "why"),
     "studio.operations.masks": ("background", "mask_quality"),
     "studio.operations.notes": ("note", "notes"),
     "studio.operations.opening": (

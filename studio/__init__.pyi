@@ -24,6 +24,7 @@ from studio.operations.gallery import gallery as gallery
 from studio.operations.inspecting import compare_runs as compare_runs
 from studio.operations.inspecting import seeds as seeds
 from studio.operations.inspecting import split_error as split_error
+from studio.operations.inspecting import uncertainty as uncertainty
 from studio.operations.inspecting import view as view
 from studio.operations.inspecting import why as why
 from studio.operations.masks import background as background

@@ -14,6 +14,7 @@ from studio.operations.inspecting import (
     inspected,
     seeds,
     split_error,
+    uncertainty,
     view,
     why,
     worst_frame,
@@ -22,6 +23,7 @@ from studio.operations.inspecting import (
 from studio.results.inspection.comparing import RunsCompared
 from studio.results.inspection.error_parts import ErrorSplit
 from studio.results.inspection.tables import Cell, Table, Viewed
+from studio.results.uncertainty.half_widths import RunUncertainty
 
 MOST_ROWS = 40
 CSV = click.option(
@@ -78,6 +80,13 @@ def split_error_command(call: Call, file: Path | None) -> dict[str, object]:
     parts = view(call.given["run"], "why").table("parts")
     caption = inspected(call.given["run"]).caption()
     return _answer([parts], (split.words,), caption, file) | {"mean": split.mean}
+
+
+@command_of(uncertainty, CSV)
+def uncertainty_command(call: Call, file: Path | None) -> dict[str, object]:
+    known: RunUncertainty = call()
+    shown = view(call.given["run"], "uncertainty")
+    return _answer(shown.tables, known.words, inspected(call.given["run"]).caption(), file)
 
 
 @command_of(compare_runs, CSV)

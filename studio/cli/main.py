@@ -41,6 +41,7 @@ COMMANDS = {
     "why": ("inspection_commands", "operations.inspecting.why"),
     "seeds": ("inspection_commands", "operations.inspecting.seeds"),
     "split-error": ("inspection_commands", "operations.inspecting.split_error"),
+    "uncertainty": ("inspection_commands", "operations.inspecting.uncertainty"),
     "compare-runs": ("inspection_commands", "operations.inspecting.compare_runs"),
     "refine": ("result_commands", "operations.results.refine"),
     "smooth": ("result_commands", "operations.results.smooth"),

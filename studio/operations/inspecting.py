@@ -20,6 +20,7 @@ from studio.results.inspection.reading import InspectedRun, TriedFrame
 from studio.results.inspection.seeds import search_seeds
 from studio.results.inspection.tables import FrameFinding, Remedy, Selection, Table, View, Viewed
 from studio.results.inspection.views import VIEWS, look, look_over, view_named
+from studio.results.uncertainty.half_widths import RunUncertainty, frames_of_twin, measure_uncertainty
 from studio.sessions.atomic_files import write_bytes
 
 ViewName = Annotated[
@@ -200,6 +201,34 @@ def split_error(
     with reporting(progress, f"{opened.session.name} / {opened.run.name}: searching for long") as report:
         search_frames(opened, chosen, evaluations, report, again=again)
     return split_of(opened)
+
+
+@operation
+@keeping_in_place
+def uncertainty(
+    run: RunName,
+    *,
+    again: Annotated[
+        bool, Field(description="Also where it was measured before and the run has not changed.")
+    ] = False,
+    progress: Reporting = None,
+) -> RunUncertainty:
+    """Say how far off each joint may be: half widths of 50, 80 and 95 %.
+
+    The run is drawn again, with masks as wrong as its own, and tracked as it was, which takes about twice as long as
+    the run took. There the truth is known, and the errors give the half widths. They are kept with the run, and
+    exported with its points. Ctrl-C ends it.
+
+    Raises RunError for a run of which too much would be promised, and says why.
+    """
+    opened = inspected(run)
+    with reporting(progress, f"{opened.session.name} / {opened.run.name}: drawn again") as report:
+        return measure_uncertainty(opened, report, again=again)
+
+
+def check_uncertainty(run: RunName) -> None:
+    """Raise RunError for a run whose joints' half widths cannot be promised."""
+    frames_of_twin(inspected(run))
 
 
 @operation

@@ -67,6 +67,7 @@ OTHERS = {
     "record": "cameras",
     "seeds": "minutes",
     "split-error": "minutes",
+    "uncertainty": "minutes",
     "compare-runs": "reads as view does",
     "correct": "minutes",
     "branch": "tracks",

@@ -16,9 +16,11 @@ from studio.foundations.errors import RunError
 from studio.operations.inspecting import (
     ViewAnswer,
     ViewList,
+    check_uncertainty,
     compare_runs,
     seeds,
     split_error,
+    uncertainty,
     view_answer,
 )
 from studio.operations.inspecting import inspected as run_to_inspect
@@ -62,6 +64,21 @@ SPLIT = JobKind(
     SplitState,
     at="/api/split-error/{identifier}",
     page="/?session={session}&run={run}&panel=why",
+)
+
+
+class UncertaintyState(NumberedJob):
+    """How a run drawn and tracked again stands. Once it is done, the view `uncertainty` has its numbers."""
+
+    run: str
+
+
+UNCERTAINTY = JobKind(
+    "uncertainty",
+    "run drawn again",
+    UncertaintyState,
+    at="/api/uncertainty/{identifier}",
+    page="/?session={session}&run={run}&panel=views&view=uncertainty",
 )
 
 
@@ -157,6 +174,26 @@ def begin_split(
 
 
 add_job_routes(router, "/split-error/{identifier}", SPLIT)
+
+
+@router.post(RUN + "/uncertainty", status_code=202)
+def begin_uncertainty(
+    session: OpenSession,
+    run: OpenRun,
+    arguments: Annotated[Arguments, body_of(uncertainty, "UncertaintyRequest")],
+    app: App,
+) -> UncertaintyState:
+    """Begin to draw and track a run again. Ask for its state, or wait for `uncertainty` events."""
+    check_uncertainty(run)
+
+    def work(job: Job) -> dict[str, object]:
+        uncertainty(run, **arguments, progress=job.report_or_stop)
+        return {}
+
+    return app.jobs.begin(UNCERTAINTY, UncertaintyState(session=session.name, run=run.name), work)
+
+
+add_job_routes(router, "/uncertainty/{identifier}", UNCERTAINTY)
 
 
 @router.get("/compared-runs")

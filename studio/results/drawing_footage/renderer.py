@@ -193,7 +193,7 @@ class RendererBefore(Renderer):
 
     def __init__(
         self,
-        pictures: Sequence[NDArray[np.floating] | Bytes],
+        pictures: Sequence[Bytes],
         cameras: tuple[Camera, ...],
         tables: Array,
         labels: NDArray[np.int64],
@@ -214,7 +214,7 @@ class RendererBefore(Renderer):
         self._views = tuple(
             _view_before(camera, samples, picture) for camera, picture in zip(cameras, pictures, strict=True)
         )
-        self._empty = [np.clip(np.rint(picture), 0, 255).astype(np.uint8) for picture in pictures]
+        self._pictures = tuple(pictures)
 
     @property
     def frame_count(self) -> int:
@@ -230,7 +230,7 @@ class RendererBefore(Renderer):
         the picture has the sensor's noise, elsewhere it is that of the empty place.
         """
         view, table = self._views[camera], self._tables[frame, 0]
-        picture, mask = self._empty[camera].copy(), np.zeros(view.depth.shape, np.uint8)
+        picture, mask = self._pictures[camera].copy(), np.zeros(view.depth.shape, np.uint8)
         window = _window(view.camera, table)
         if window is not None:
             surface, coverage = self._person(view, table, *window)
@@ -266,7 +266,7 @@ def _view(room: Room, camera: Camera, samples: int) -> _View:
     )
 
 
-def _view_before(camera: Camera, samples: int, picture: NDArray[np.floating] | Bytes) -> _View:
+def _view_before(camera: Camera, samples: int, picture: Bytes) -> _View:
     """A camera's constant data where a picture (H, W, 3), BGR grey levels, stands for the room."""
     shape = (camera.height, camera.width)
     levels = np.clip(np.asarray(picture, np.float32)[..., ::-1], 0.0, LIGHTEST)

@@ -11,8 +11,12 @@ from studio.footage.capture.calibration_files import CALIBRATION_FORMATS, export
 from studio.foundations.arrays import Array
 from studio.foundations.errors import ExportError
 from studio.foundations.words import counted
+from studio.results.export.half_widths import half_widths_of
 from studio.results.export.naming import Points, points_of
 from studio.results.export.task import ExportTask, Written, agreed, apart, turned_apart
+
+HALF_WIDTHS = "half-widths"
+"""Ends the name of a second TRC."""
 
 
 def marked_points(task: ExportTask) -> tuple[Points, Array]:
@@ -24,7 +28,10 @@ def marked_points(task: ExportTask) -> tuple[Points, Array]:
 
 
 def write_trc_file(task: ExportTask) -> Written:
-    """Markers as TRC; missing ones are blank cells. Raises ExportError where it does not read back."""
+    """Markers as TRC; missing ones are blank cells. Their half widths, where they are known, are a second file.
+
+    Raises ExportError where it does not read back.
+    """
     points, places = marked_points(task)
     unit = task.options.unit
     # The writer of TRC turns the world's z up into y up; a file with z up gets the axes turned beforehand.
@@ -38,7 +45,15 @@ def write_trc_file(task: ExportTask) -> Written:
     if read.names != points.names:
         raise ExportError(f"'{task.place.name}' names other points than were written.", "Export it again.")
     checked = agreed(task.place, apart(read.positions, written))
-    return Written((task.place,), checked, unit_and_point_notes(task, points, "blank cells"))
+    notes = unit_and_point_notes(task, points, "blank cells")
+    widths, said = half_widths_of(task, points)
+    if widths is None:
+        return Written((task.place,), checked, (*notes, *said))
+    beside = task.place.with_name(f"{task.place.stem}-{HALF_WIDTHS}{task.place.suffix}")
+    alike = np.repeat(widths[..., None], 3, axis=2)
+    write_trc(beside, MarkerMotion(points.names, task.motion.times, alike, unit, task.motion.fps))
+    agreed(beside, apart(read_trc(beside).positions, alike))
+    return Written((task.place, beside), checked, (*notes, *said, f"'{beside.name}' has them as x, y and z."))
 
 
 def write_c3d_file(task: ExportTask) -> Written:

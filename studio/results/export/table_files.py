@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import joint_frames
 from studio.foundations.arrays import Array, read_archive
 from studio.foundations.errors import ExportError
+from studio.results.export.half_widths import MEANS, WITHIN, half_widths_of
 from studio.results.export.marker_files import marked_points, point_notes, unit_and_point_notes
 from studio.results.export.naming import Points
 from studio.results.export.task import ExportTask, Written, agreed, apart
@@ -28,8 +29,8 @@ ROWS_A_STEP = 500
 
 
 def write_csv(task: ExportTask) -> Written:
-    """One row a frame: number, time, state, confidence, the pose's entries, the points, and the note on the frame where
-    the run has notes. The heads name the units. Other layouts hold the points alone.
+    """One row a frame: number, time, state, confidence, the pose's entries, the points, their half widths if known, and
+    the note on the frame where the run has notes. The heads name the units. Other layouts hold the points alone.
     """
     points, places = marked_points(task)
     if task.options.layout in LAYOUTS:
@@ -46,9 +47,14 @@ def write_csv(task: ExportTask) -> Written:
         *(f"{entry.name} [{sign}]" for entry, sign in zip(motion.body.parameters, signs, strict=True)),
         *(f"{name} {axis} [{options.unit}]" for name in points.names for axis in "xyz"),
     ]
+    widths, said = half_widths_of(task, points)
+    parts = [shown, task.axes.points(places).reshape(len(places), -1)]
+    if widths is not None:
+        heads += [f"{name} {WITHIN} [{options.unit}]" for name in points.names]
+        parts.append(widths / task.axes.mm)
     remarks = notes_by_frame(task.run)
     heads += ["note"] if remarks else []
-    table = np.concatenate([shown, task.axes.points(places).reshape(len(places), -1)], axis=1)
+    table = np.concatenate(parts, axis=1)
     with task.place.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(heads)
@@ -63,7 +69,7 @@ def write_csv(task: ExportTask) -> Written:
     notes = [f"Angles in {options.angles}, lengths in {options.unit}, {options.up.upper()} up."]
     if options.up == "y":
         notes.append("The pose's entries stay those of the world, z up; the points are turned.")
-    return Written((task.place,), checked, (*notes, *point_notes(task, points, "empty cells")))
+    return Written((task.place,), checked, (*notes, *point_notes(task, points, "empty cells"), *said))
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,9 +134,12 @@ def _write_points(
 
 
 def write_parquet(task: ExportTask) -> Written:
-    """A row a frame and point: frame, time, name, x, y, z, conf; everything else is in the schema's metadata."""
+    """A row a frame and point: frame, time, name, x, y, z, conf, and half_width if known; all else is in the schema's
+    metadata.
+    """
     points, places = marked_points(task)
     motion, count = task.motion, len(points.names)
+    widths, said = half_widths_of(task, points)
     converted = task.axes.points(places).reshape(-1, 3)
     columns = {
         "frame": pa.array(np.repeat(motion.numbers, count)),
@@ -139,12 +148,15 @@ def write_parquet(task: ExportTask) -> Written:
         **{axis: pa.array(converted[:, at], from_pandas=True) for at, axis in enumerate("xyz")},
         "conf": pa.array(np.repeat(motion.confidence, count), from_pandas=True),
     }
+    if widths is not None:
+        columns["half_width"] = pa.array((widths / task.axes.mm).ravel(), from_pandas=True)
     metadata = {
         **task.source,
         "unit": task.options.unit,
         "up": task.options.up,
         "fps": f"{motion.fps:.12g}",
         "names": task.options.names,
+        **({"half_width": MEANS} if widths is not None else {}),
         **_remarks(task),
     }
     table = pa.table(columns).replace_schema_metadata(metadata)
@@ -154,7 +166,7 @@ def write_parquet(task: ExportTask) -> Written:
     read = pq.read_table(task.place)
     values = np.stack([read.column(axis).to_numpy() for axis in "xyz"], axis=-1).reshape(places.shape)
     checked = agreed(task.place, apart(task.axes.points_back(values), places))
-    return Written((task.place,), checked, point_notes(task, points, "null"))
+    return Written((task.place,), checked, (*point_notes(task, points, "null"), *said))
 
 
 def _remark(remarks: Mapping[int, str], frame: float) -> str:
@@ -189,6 +201,9 @@ def write_npz(task: ExportTask) -> Written:
         "joint_names": np.array([joint.name for joint in motion.body.joints]),
         "joint_parents": np.array([joint.parent for joint in motion.body.joints]),
     }
+    widths, said = half_widths_of(task, points)
+    if widths is not None:
+        arrays["half_widths"] = widths / axes.mm
     about = {
         **task.source,
         "unit": task.options.unit,
@@ -196,6 +211,7 @@ def write_npz(task: ExportTask) -> Written:
         "fps": motion.fps,
         "poses": "radians and mm of the body's parameters, world z up, whatever unit and up say",
         "joint_rotations": "columns are the joint's axes in the file's world",
+        **({"half_widths": MEANS} if widths is not None else {}),
         **_remarks(task),
     }
     task.step("writing", 0, 2)
@@ -206,7 +222,7 @@ def write_npz(task: ExportTask) -> Written:
         np.array_equal(read[name], value, equal_nan=value.dtype.kind == "f") for name, value in arrays.items()
     )
     difference = apart(axes.points_back(read["markers"]), places) if same else math.inf
-    return Written((task.place,), agreed(task.place, difference), point_notes(task, points, "NaN"))
+    return Written((task.place,), agreed(task.place, difference), (*point_notes(task, points, "NaN"), *said))
 
 
 LARGEST_EXPORT = 8 << 30
@@ -225,7 +241,8 @@ def _read_csv_back(
         raise ExportError(f"'{task.place.name}' reads back with other columns or rows.", "Export it again.")
     numbers = slice(len(FIRST_COLUMNS), len(heads) - (heads[-1] == "note"))
     table = np.array([[float(cell) if cell else math.nan for cell in row[numbers]] for row in rows[1:]])
-    read = task.axes.points_back(table[:, poses.shape[1] :].reshape(places.shape))
+    last = poses.shape[1] + places[0].size
+    read = task.axes.points_back(table[:, poses.shape[1] : last].reshape(places.shape))
     angles = table[:, : poses.shape[1]][:, angle]
     angles = angles if task.options.angles == "degrees" else np.degrees(angles)
     turned = np.nan_to_num(np.abs(angles - np.degrees(poses[:, angle]))).max(initial=0.0)

@@ -32,6 +32,7 @@ from studio.results.inspection.tables import (
     Viewed,
     ViewResult,
 )
+from studio.results.uncertainty import view as uncertainty
 
 OfFrame = Callable[[InspectedFrame, Selection], ViewResult | Rows]
 OfRun = Callable[[InspectedRun, Selection], ViewResult | Rows]
@@ -60,6 +61,7 @@ _ENTRIES = {
         _Entry(modes.VIEW, modes.rows, modes.over_run),
         _Entry(seeds.VIEW, seeds.rows),
         _Entry(coverage.VIEW, coverage.of_frame, coverage.over_run),
+        _Entry(uncertainty.VIEW, uncertainty.of_frame, uncertainty.over_run),
         _Entry(why.VIEW, why.rows, why.run_rows),
     )
 }

@@ -13,6 +13,7 @@ block without the bias that this block has helped to learn.
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -53,6 +54,11 @@ def blocks_of(count: int, length: int) -> tuple[slice, ...]:
     """`count` frames in blocks of at least `length`, as even as can be."""
     edges = np.linspace(0, count, max(1, count // length) + 1).round().astype(np.int64).tolist()
     return tuple(slice(first, last) for first, last in itertools.pairwise(edges))
+
+
+def blocks_for(level: float) -> int:
+    """The least number of blocks from which a level has a half width."""
+    return math.ceil(level / (1.0 - level) - 1e-9)
 
 
 def half_widths(scores: Array, blocks: Sequence[slice], levels: Sequence[float] = LEVELS) -> Array:

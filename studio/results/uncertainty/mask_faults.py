@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
+import msgspec
 import numpy as np
 
 from studio.body.forward_kinematics import limb_ends
@@ -42,10 +43,9 @@ class Fault:
     is_hole: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FaultShares:
-    """Over a run's frames, of a camera. holes, false_areas : mean area as a share of the silhouette's. empty : share of
-    frames without a mask where the body should be. touched : share of frames with a fault.
+class FaultShares(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a camera's masks get wrong. holes, false_areas : mean area over frames, as a share of the silhouette's.
+    empty : share of frames without a mask where the body should be. touched : share of frames with a fault.
     """
 
     camera: str
@@ -83,7 +83,7 @@ class MaskFaults:
             whole = int(np.count_nonzero(body))
             if not whole:
                 continue
-            missing, false = cv2.subtract(body, mask), cv2.subtract(mask, body)
+            missing, false = body & ~mask, mask & ~body
             if np.count_nonzero(missing) > ALL_LOST * whole:
                 self._empty.add((frame, view))
                 continue

@@ -55,7 +55,7 @@ SEED = 9001
 """Added to the run's: its twin draws other random numbers."""
 AWAY = 1.0 / 3.0
 """Share of the run from which the faults of a frame's masks come."""
-SAMPLES, NOISE = 2, 2.5
+SAMPLES, NOISE = 1, 2.5
 """Rays along a pixel's side, and the sensor's noise, grey levels."""
 GIRTHS, GIRTH_FRAMES, GIRTH_LIMITS = (0.9, 1.1), 4, (0.6, 1.6)
 KEPT_BYTES = 64 << 20
@@ -124,6 +124,17 @@ def points_of(body: BodyModel) -> tuple[str, ...]:
     return tuple(one.name for one in (body.markers or body.drawn))
 
 
+def carriers_of(body: BodyModel) -> list[int]:
+    """(M,) the joint that carries each of the body's points: of one at its joint's origin the joint above."""
+    carriers: list[int] = []
+    if not body.markers:
+        return [limb.joint for limb in body.drawn]
+    for marker in body.markers:
+        above = body.joints[marker.joint].parent
+        carriers.append(above if above >= 0 and not np.any(marker.offset) else marker.joint)
+    return carriers
+
+
 def track_twin(run: InspectedRun, frames: range, progress: Progress) -> TwinErrors:
     """Draw and track a run's twin. frames : of the run, each with a pose. What a progress raises ends it."""
     record, body = run.run.record, run.body
@@ -133,7 +144,7 @@ def track_twin(run: InspectedRun, frames: range, progress: Progress) -> TwinErro
         cameras = run.run.cameras()
         backgrounds = Backgrounds(own)
         faults = _measured(run, frames, poses, cameras, own, backgrounds, progress)
-        pictures = [backgrounds.model(camera.name, "gaussian").mean for camera in cameras]
+        pictures = [_empty_place(backgrounds, camera.name) for camera in cameras]
         renderer, truth = _drawn(body, poses, cameras, pictures, record.fps, record.seed)
         del backgrounds
         footage = open_things.enter_context(closing(TwinFootage(own, renderer, frames.start, faults)))
@@ -146,13 +157,19 @@ def track_twin(run: InspectedRun, frames: range, progress: Progress) -> TwinErro
             _track(twin, problems, progress)
         found = reported(twin).poses
         errors = body_points(twin.body(), found) - truth
-        turns = joint_frames(twin.body(), found)[:, _carriers(body), :, :3]
+        turns = joint_frames(twin.body(), found)[:, carriers_of(body), :, :3]
     return TwinErrors(errors, turns, faults.shares())
 
 
 def reported(run: StoredRun) -> Track:
     """The run's track with its sides put right, if anything was; else the search's own."""
     return read_track(run, best_track(run, (SIDES,)).name)
+
+
+def _empty_place(backgrounds: Backgrounds, camera: str) -> Bytes:
+    """(H, W, 3) what a camera sees without the body: its plate, else the footage's median."""
+    plate = backgrounds.empty_room(camera)
+    return np.rint(backgrounds.combined(camera)[0].mean).astype(np.uint8) if plate is None else plate
 
 
 def _measured(
@@ -178,7 +195,7 @@ def _drawn(
     body: BodyModel,
     poses: Array,
     cameras: tuple[Camera, ...],
-    pictures: list[Array] | list[Bytes],
+    pictures: list[Bytes],
     fps: float,
     seed: int,
 ) -> tuple[RendererBefore, Array]:
@@ -200,7 +217,7 @@ def _drawn(
 
 def _renderer(
     cameras: tuple[Camera, ...],
-    pictures: list[Array] | list[Bytes],
+    pictures: list[Bytes],
     tables: Array,
     labels: IntArray,
     scale: float,
@@ -218,7 +235,7 @@ def _girth(
     body: BodyModel,
     poses: Array,
     cameras: tuple[Camera, ...],
-    pictures: list[Array] | list[Bytes],
+    pictures: list[Bytes],
     surface: Callable[[float], tuple[Array, IntArray]],
 ) -> float:
     """The girth with which a person covers as much of the pictures as the body's cones do."""
@@ -243,17 +260,6 @@ def _girth(
     slope = (areas[1] - areas[0]) / (high - low)
     girth = low + (wanted - areas[0]) / slope if slope > 0.0 else 1.0
     return float(np.clip(girth, *GIRTH_LIMITS))
-
-
-def _carriers(body: BodyModel) -> list[int]:
-    """(M,) the joint that carries each of the body's points: of one at its joint's origin the joint above."""
-    carriers: list[int] = []
-    if not body.markers:
-        return [limb.joint for limb in body.drawn]
-    for marker in body.markers:
-        above = body.joints[marker.joint].parent
-        carriers.append(above if above >= 0 and not np.any(marker.offset) else marker.joint)
-    return carriers
 
 
 @contextmanager
