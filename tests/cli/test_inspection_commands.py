@@ -70,6 +70,20 @@ def test_whose_fault_the_errors_are(tmp_path: Path) -> None:
     assert "frame 7" in refusal_of("split-error", "toy", "one", "--frame", "7")
 
 
+def test_how_far_off_joints_may_be(tmp_path: Path) -> None:
+    assert "it has 2 finished frames, and 8 are needed" in refusal_of("uncertainty", "toy", "one")
+    call("track toy --particles 20 --layers 3 --set constraints=clamp --name whole")
+    told = answer_of("uncertainty", "toy", "whole")
+    joints = told["tables"]["joints"]
+    assert [row["point"] for row in joints] == ["Root", "Joint1", "Joint2", "Joint3", "Tip"]
+    assert told["notes"][0].startswith("Measured on 8 frames of the run drawn again")
+    said = call("uncertainty", "toy", "whole").output
+    assert told["notes"][0] in " ".join(said.split())
+    call("uncertainty", "toy", "whole", "--csv", tmp_path / "half_widths.csv")
+    assert "within_50 [mm]" in (tmp_path / "half_widths.csv").read_text()
+    assert answer_of("view", "toy", "whole", "--view", "uncertainty")["tables"] == told["tables"]
+
+
 def test_a_line_break_in_a_run_s_record_begins_no_cell() -> None:
     text = tables_csv([], "variance of toy / one (studio 1\r\n=cmd|' /C calc'!A0)")
     assert text.splitlines() == ["# variance of toy / one (studio 1 =cmd|' /C calc'!A0)"]

@@ -5,7 +5,10 @@ import pytest
 from waiting import until
 from web_doubles import Studio
 
+from studio.results.inspection.reading import InspectedRun
 from studio.results.inspection.views import VIEWS
+from studio.results.uncertainty import half_widths
+from studio.results.uncertainty.twin import TwinErrors, points_of
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -16,7 +19,7 @@ RUN = "/api/sessions/take1/runs/first"
 def test_the_registry_names_every_view_with_its_question(studio: Studio) -> None:
     told = studio.get("/api/views")["views"]
     assert [entry["name"] for entry in told] == list(VIEWS)
-    assert len(told) == 13
+    assert len(told) == 14
     assert all(entry["title"] and entry["question"].endswith("?") and entry["tables"] for entry in told)
 
 
@@ -120,6 +123,31 @@ def test_whose_fault_the_errors_are_is_a_job(studio: Studio, tracked: StoredRun)
     assert first["kind"].startswith("part of ")
     studio.post(f"{RUN}/split-error", {"evaluations": 10}, code=422)
     studio.post(f"{RUN}/split-error", {"frame": 3}, code=404)
+
+
+def test_how_far_off_joints_may_be_is_a_job(
+    studio: Studio, tracked: StoredRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused = studio.post(f"{RUN}/uncertainty", {}, code=409)
+    assert "it has 2 finished frames, and 8 are needed" in refused["message"]
+    [told] = studio.get(f"{RUN}/views/uncertainty")["notes"]
+    assert told.startswith("How far off joints may be has not been measured")
+
+    def errors(run: InspectedRun, frames: range, progress: object) -> TwinErrors:
+        points = len(points_of(run.body))
+        off = np.random.default_rng(0).standard_normal((len(frames), points, 3))
+        return TwinErrors(off, np.tile(np.eye(3), (len(frames), points, 1, 1)), ())
+
+    monkeypatch.setattr(half_widths, "FEWEST_FRAMES", 2)
+    monkeypatch.setattr(half_widths, "track_twin", errors)
+    begun = studio.post(f"{RUN}/uncertainty", {}, code=202)
+    address = f"/api/uncertainty/{begun['identifier']}"
+    until(lambda: studio.get(address)["state"] in ("done", "failed"))
+    assert studio.get(address)["state"] == "done", studio.get(address)
+    told = studio.get(f"{RUN}/views/uncertainty")
+    assert told["notes"][0].startswith("Measured on 2 frames of the run drawn again")
+    [joints] = [entry for entry in told["tables"] if entry["name"] == "joints"]
+    assert len(joints["rows"]) == 15
 
 
 def test_runs_are_compared(studio: Studio, session: Session, tracked: StoredRun) -> None:
