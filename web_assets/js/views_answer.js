@@ -842,6 +842,98 @@ function coverage(sheet, { frames: rows, correlation, pit }, at) {
     : "";
 }
 
+const LEVELS = [50, 80, 95];
+const percent = (share) => (share === null ? "none" : `${Math.round(100 * share)} %`);
+
+/** Uncertainty: half widths by joint, and how often they hold beside how often that is promised. */
+function uncertainty(sheet, { joints, coverage: shares }, at) {
+  const [one, two] = sheet.columns(2, {
+    height: Math.max(120, at.room - 76),
+    least: [220, 0],
+    gutters: [62, 56],
+    shares: [1.6, 1],
+    right: 20,
+  });
+  const names = joints.map((row) => row.point);
+  const known = LEVELS.filter((level) => joints.some((row) => row[`within_${level}`] !== null));
+  const plot = sheet.plot(one, {
+    title: "Half widths",
+    unit: "mm; so many frames are no farther off",
+    names: [...known.map((level) => `${level} %`), "bias"],
+    x: categories(names, ""),
+    y: numbers("", { scale: false, min: 0 }),
+    over: (points) => {
+      const row = joints[points[0].dataIndex];
+      /** @param {string} words @param {string} key @returns {[string, any]} */
+      const line = (words, key) => [words, `${figure(row[key])} mm`];
+      return tipOf(row.point, [
+        ...known.map((level) => line(`${level} % within`, `within_${level}`)),
+        ...known.map((level) => line(`without bias, ${level} %`, `scatter_${level}`)),
+        line(`bias, in axes of ${row.carrier}`, "bias"),
+      ]);
+    },
+  });
+  known.forEach((level, index) => {
+    sheet.line(
+      plot,
+      `${level} %`,
+      joints.map((row) => row[`within_${level}`]),
+      seriesColour(index),
+      { stepped: false },
+    );
+  });
+  sheet.line(
+    plot,
+    "bias",
+    joints.map((row) => row.bias),
+    token("text-quiet"),
+    { dashed: true },
+  );
+  const hasTruth = shares.some((row) => row.true !== null);
+  const plotted = sheet.plot(two, {
+    title: "Promised and found",
+    unit: "share of frames within; on the line the promise holds",
+    names: ["drawn again", ...(hasTruth ? ["truth"] : [])],
+    x: numbers("promised", { scale: false, min: 0.4, max: 1 }),
+    y: numbers("", { scale: false, min: 0, max: 1 }),
+  });
+  const found = (name, key, colour, symbol) =>
+    sheet.series(plotted, {
+      name,
+      type: "scatter",
+      symbol,
+      symbolSize: 7,
+      itemStyle: { color: token(colour), opacity: 0.6 },
+      data: shares
+        .filter((row) => row[key] !== null)
+        .map((row) => ({ value: [row.promised, row[key]], row })),
+      tip: ({ data: { row } }) =>
+        tipOf(row.point, [
+          ["promised", percent(row.promised)],
+          ["found, drawn again", percent(row.found)],
+          ["found, truth", percent(row.true)],
+        ]),
+    });
+  found("drawn again", "found", "accent", "circle");
+  if (hasTruth) found("truth", "true", "truth", "diamond");
+  sheet.line(
+    plotted,
+    "",
+    [
+      [0.4, 0.4],
+      [1, 1],
+    ],
+    token("text-quiet"),
+    { dashed: true, symbols: false, silent: true },
+  );
+  const last = known.at(-1);
+  if (!last) return "";
+  const widest = joints.reduce((most, row) =>
+    (row[`within_${last}`] ?? 0) > (most[`within_${last}`] ?? 0) ? row : most,
+  );
+  return `${widest.point}: in ${last} % of frames no farther off than ${figure(widest[`within_${last}`])} mm.`;
+}
+
 /** Weight and, with truth, error over the frames. */
 function overFrames(sheet, { frames: rows }, at) {
   const measured = rows.some((row) => row.error_mm !== null);
@@ -891,5 +983,6 @@ export const ANSWER_VIEWS = {
   modes: { frame: modesOfFrame, run: modesOfRun },
   seeds: { frame: seeds },
   coverage: { run: coverage },
+  uncertainty: { run: uncertainty },
   frames: { run: overFrames },
 };

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from drawings import Drawings, clouds_of
 from planted_runs import FEWER_PARTICLES, FRAME, LAYERS, MORE_LAYERS, PARTICLES
@@ -12,6 +13,9 @@ from studio.results.inspection.reading import InspectedRun
 from studio.results.inspection.seeds import search_seeds
 from studio.results.inspection.tables import Selection, Viewed
 from studio.results.inspection.views import VIEWS, look, look_over
+from studio.results.uncertainty import view as uncertainty_view
+from studio.results.uncertainty.half_widths import RunUncertainty, uncertainty_of
+from studio.results.uncertainty.twin import TwinErrors, points_of
 
 pytestmark = pytest.mark.browser
 
@@ -200,9 +204,30 @@ CHECKS: dict[str, Callable[[Series, Viewed, Viewed], None]] = {
 }
 
 
-def test_all_thirteen_views_are_drawn_here() -> None:
-    assert list(CHECKS) == list(VIEWS)
+def test_all_views_are_drawn_here() -> None:
+    """All but that of the uncertainty, beside which nothing is tried."""
+    assert list(CHECKS) == [name for name in VIEWS if name != "uncertainty"]
     assert len(CHECKS) == 13
+
+
+def test_half_widths_and_how_often_they_hold_are_drawn(
+    drawings: Drawings, run: InspectedRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    count, size = 100, len(points_of(run.body))
+    errors = np.random.default_rng(1).standard_normal((count, size, 3)) * np.linspace(1.0, 9.0, size)[:, None]
+    twin = TwinErrors(errors, np.tile(np.eye(3), (count, size, 1, 1)), ())
+    known = RunUncertainty(uncertainty_of(run.body, twin, "raw", ""), "", ("Measured.",))
+    monkeypatch.setattr(uncertainty_view, "kept_uncertainty", lambda run: known)
+    answer = look_over(run, "uncertainty", Selection())
+    series = drawings.draw("uncertainty", answer, frame=FRAME, of="run", selection=Selection())["series"]
+    for level in (50, 80, 95):
+        (line,) = points(series, f"{level} %")
+        assert line == answer.table("joints").column(f"within_{level}")
+    (found,) = points(series, "drawn again", "scatter")
+    rows = answer.table("coverage").records()
+    assert found == [[row["promised"], row["found"]] for row in rows]
+    (true,) = points(series, "truth", "scatter")
+    assert true == [[row["promised"], row["true"]] for row in rows]
 
 
 @pytest.mark.parametrize("view", CHECKS)

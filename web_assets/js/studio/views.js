@@ -15,6 +15,7 @@ import { Select } from "./parts.js";
 import { FigurePlace } from "./figure_place.js";
 import { liveView, triedView } from "./live_views.js";
 import { SeedTools, startSeeds } from "./seeds.js";
+import { startUncertainty, UncertaintyTools } from "./uncertainty.js";
 import { DRAWINGS, isOfRun, numbersOf, OVER_FRAMES, queryOf } from "./view_numbers.js";
 
 /** @import { Figure, Shown } from "../figure.js" */
@@ -335,6 +336,7 @@ function Tools() {
       />`
     }
     ${view.name === "seeds" && html`<${SeedTools} />`}
+    ${view.name === "uncertainty" && html`<${UncertaintyTools} />`}
   `;
 }
 
@@ -442,8 +444,10 @@ export function startViews() {
   onEvent("frame", (event, here) => {
     if (here && !event.reannealed) age += 1;
   });
-  startSeeds(() => {
+  const computed = () => {
     age += 1;
     loadLater();
-  });
+  };
+  startSeeds(computed);
+  startUncertainty(computed);
 }
