@@ -22,6 +22,8 @@ pytestmark = pytest.mark.browser
 RUN = "/api/sessions/walk/runs/seen"
 FRAMES, LAYERS, PARTICLES = 10, 5, 60
 FRAME = 6
+LONG = 300_000
+"""Milliseconds for a run to be drawn and tracked again."""
 SETTINGS = {"layers": LAYERS, "particles": PARTICLES, "survival": 0.3, "recovery": "off"}
 FIGURE = "#panel-views .figure-chart"
 OPTION = """async (place) => {
@@ -773,6 +775,25 @@ def test_a_frame_s_seeds_are_searched_and_drawn(window: StudioPage, studio: Stud
     ):
         assert [bar["value"] for bar in drawn[name]] == pytest.approx([row[key] for row in rows])
     assert len(rows_of(studio, "seeds", "seeds")) >= 3
+
+
+def test_how_far_off_joints_may_be_is_measured_and_drawn(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.bring_to_front()
+    page.evaluate(SET, {"panel": "views", "view": "uncertainty", "frame": FRAME, "compared": None})
+    page.get_by_role("button", name="Measure how far off joints may be").click()
+    cancel = page.locator("#panel-views").get_by_role("button", name="Cancel", exact=True)
+    cancel.wait_for()
+    page.reload()
+    cancel.wait_for()
+    page.locator("#panel-views .readout", has_text="of frames no farther off than").wait_for(timeout=LONG)
+    rows = rows_of(studio, "uncertainty", "joints", run=True)
+    assert len(rows) == 15
+    drawn = {str(one["name"]): one["data"] for one in page.evaluate(OPTION, FIGURE)}
+    assert drawn["50 %"] == pytest.approx([row["within_50"] for row in rows])
+    coverage = rows_of(studio, "uncertainty", "coverage", run=True)
+    known = [[row["promised"], row["true"]] for row in coverage if row["true"] is not None]
+    assert [dot["value"] for dot in drawn["truth"]] == known
 
 
 def test_why_says_first_whose_fault_the_error_is(window: StudioPage, studio: StudioServer) -> None:

@@ -188,6 +188,19 @@ class SurfaceRenderer(Renderer):
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnSurface:
+    """A surface in a picture. window : rows and columns. picture : (h, w, 3) BGR. mask : (h, w) 0 or 255."""
+
+    window: tuple[slice, slice]
+    picture: Bytes
+    mask: Bytes
+
+    @property
+    def nbytes(self) -> int:
+        return self.picture.nbytes + self.mask.nbytes
+
+
 class RendererBefore(Renderer):
     """Renders a surface of swept spheres before pictures of an empty place, one a camera; it throws no shadow."""
 
@@ -225,18 +238,25 @@ class RendererBefore(Renderer):
         """The cameras' names."""
         return tuple(view.camera.name for view in self._views)
 
-    def seen(self, camera: int, frame: int) -> tuple[Bytes, Bytes]:
+    def surface(self, camera: int, frame: int) -> DrawnSurface | None:
+        """What the camera sees of the surface, None where it sees nothing."""
+        view, table = self._views[camera], self._tables[frame, 0]
+        window = _window(view.camera, table)
+        if window is None:
+            return None
+        surface, coverage = self._person(view, table, *window)
+        light = view.key[window] * (1.0 - coverage[..., None]) + surface
+        mask = np.where(coverage >= 0.5, np.uint8(255), np.uint8(0))
+        return DrawnSurface(window, self._developed(light, camera, frame), mask)
+
+    def seen(self, camera: int, drawn: DrawnSurface | None) -> tuple[Bytes, Bytes]:
         """(H, W, 3) BGR picture and (H, W) mask, 255 where the surface covers half a pixel or more. Around the surface
         the picture has the sensor's noise, elsewhere it is that of the empty place.
         """
-        view, table = self._views[camera], self._tables[frame, 0]
-        picture, mask = self._pictures[camera].copy(), np.zeros(view.depth.shape, np.uint8)
-        window = _window(view.camera, table)
-        if window is not None:
-            surface, coverage = self._person(view, table, *window)
-            light = view.key[window] * (1.0 - coverage[..., None]) + surface
-            picture[window] = self._developed(light, camera, frame)
-            mask[window] = np.where(coverage >= 0.5, 255, 0)
+        picture = self._pictures[camera].copy()
+        mask = np.zeros(picture.shape[:2], np.uint8)
+        if drawn is not None:
+            picture[drawn.window], mask[drawn.window] = drawn.picture, drawn.mask
         return picture, mask
 
 

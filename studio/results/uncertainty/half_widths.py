@@ -45,6 +45,8 @@ from studio.sessions.work_under_way import one_at_a_time
 FILE_NAME = "uncertainty.json"
 FEWEST_FRAMES = 8
 UNSEEN = (LOST, NO_EVIDENCE)
+WIDER = 1.3
+"""What the errors of twins are multiplied by: XXX"""
 STALE = "the run's poses, its masks or its cameras have changed"
 REMEDY = "Its joints have no half widths; 'evaluate' measures it where there is a truth."
 NOT_IN_IT = (
@@ -57,7 +59,7 @@ class PointUncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How far off a point of the body may be. Of each level in LEVELS, null where so few frames allow none:
 
     half_widths_mm : distance from where the run reports it. scatter_mm : the same once the bias is taken off.
-    found : share of the twin's frames within the half width that the other frames give.
+    found : share of the twin's frames within the half width that the other frames give, before it is made WIDER.
 
     bias_mm : (3,) mean error in the axes of joint `carrier`.
     """
@@ -144,14 +146,14 @@ def measure_uncertainty(run: InspectedRun, progress: Progress, *, again: bool = 
 
 def uncertainty_of(body: BodyModel, twin: TwinErrors, track: str, stamp: str) -> Uncertainty:
     """The half widths that a twin's errors give."""
-    count = len(twin.errors)
-    alike = frames_alike(twin.errors.reshape(count, -1))
-    blocks = blocks_of(count, alike)
     off: Array = np.linalg.norm(twin.errors, axis=2)
+    alike = frames_alike(off)
+    blocks = blocks_of(len(off), alike)
     # In the axes of what carries the point, so that a bias turns with the limb.
     local: Array = np.einsum("fmji,fmj->fmi", twin.turns, twin.errors)
-    scatter: Array = np.linalg.norm(without_bias(local, blocks), axis=2)
-    widths, scatters = half_widths(off, blocks), half_widths(scatter, blocks)
+    apart = blocks_of(len(off), frames_alike(local.reshape(len(off), -1)))
+    scatter: Array = np.linalg.norm(without_bias(local, apart), axis=2)
+    widths, scatters = WIDER * half_widths(off, blocks), WIDER * half_widths(scatter, apart)
     shares, bias = found_coverage(off, blocks), local.mean(axis=0)
     points = tuple(
         PointUncertainty(
@@ -167,7 +169,7 @@ def uncertainty_of(body: BodyModel, twin: TwinErrors, track: str, stamp: str) ->
             zip(points_of(body), limbs_of_points(body), carriers_of(body), strict=True)
         )
     )
-    return Uncertainty(stamp, track, count, alike, len(blocks), LEVELS, points, twin.faults)
+    return Uncertainty(stamp, track, len(off), alike, len(blocks), LEVELS, points, twin.faults)
 
 
 def words_of(known: Uncertainty) -> tuple[str, ...]:

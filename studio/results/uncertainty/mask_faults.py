@@ -68,11 +68,13 @@ class MaskFaults:
         """(F, V, L, 2, 2) pixels of the limbs' lines, NaN behind a camera."""
         self._faults: dict[tuple[int, int], list[Fault]] = {}
         self._empty: set[tuple[int, int]] = set()
-        self._sums: Array = np.zeros((len(poses), len(cameras), 2))
+        self._measured: set[int] = set()
+        self._sums: Array = np.zeros((len(cameras), 2))
 
     def measure(self, frame: int, masks: Mapping[str, Bytes]) -> None:
         """Find the faults of a frame. masks : by camera (H, W), 0 or 255."""
         pose = self._poses[frame]
+        self._measured.add(frame)
         outlines, sizes = (
             limb_contours(self._body, self._cameras, pose),
             mm_at(self._body, self._cameras, pose),
@@ -97,7 +99,7 @@ class MaskFaults:
             if found:
                 self._faults[frame, view] = found
             for fault in found:
-                self._sums[frame, view, int(fault.is_hole)] += np.count_nonzero(fault.area) / whole
+                self._sums[view, int(fault.is_hole)] += np.count_nonzero(fault.area) / whole
 
     def _pieces(self, frame: int, view: int, area: Bytes, across: int, *, is_hole: bool) -> list[Fault]:
         """The pieces of an area that are as thick as `across` pixels somewhere, each with its nearest limb."""
@@ -145,13 +147,13 @@ class MaskFaults:
         )
 
     def shares(self) -> tuple[FaultShares, ...]:
-        """How much is wrong, by camera."""
-        frames = len(self._poses)
+        """How much is wrong, by camera, over the frames that were measured."""
+        frames = max(1, len(self._measured))
         by_camera: list[FaultShares] = []
         for view, camera in enumerate(self._cameras):
             empty = sum(at == view for _, at in self._empty)
             touched = sum(at == view for _, at in self._faults) + empty
-            false, holes = self._sums[:, view].mean(axis=0)
+            false, holes = self._sums[view] / frames
             by_camera.append(
                 FaultShares(camera.name, float(holes), float(false), empty / frames, touched / frames)
             )

@@ -33,7 +33,7 @@ from studio.foundations.knobs import Value
 from studio.foundations.progress import Progress
 from studio.results.drawing_footage.body_footage import body_pieces
 from studio.results.drawing_footage.flesh import IntArray, clothed_pieces, piece_tables
-from studio.results.drawing_footage.renderer import RendererBefore
+from studio.results.drawing_footage.renderer import DrawnSurface, RendererBefore
 from studio.results.drawing_footage.rooms import OFFICE_LIGHTS
 from studio.results.inspection.reading import InspectedRun
 from studio.results.inspection.reference import body_points
@@ -58,8 +58,10 @@ AWAY = 1.0 / 3.0
 SAMPLES, NOISE = 1, 2.5
 """Rays along a pixel's side, and the sensor's noise, grey levels."""
 GIRTHS, GIRTH_FRAMES, GIRTH_LIMITS = (0.9, 1.1), 4, (0.6, 1.6)
-KEPT_BYTES = 64 << 20
-"""Drawn pictures with their masks that are kept."""
+KEPT_BYTES = 256 << 20
+"""Of what was drawn, where the body is: a person in four small pictures takes a MB a frame."""
+EVERY = 2
+"""Masks are compared with silhouettes in every so many frames; the others have the faults of the one before."""
 OWN_MASKS: Mapping[str, Value] = {
     "background_model": "mask",
     "mask_clean_given": False,
@@ -88,16 +90,16 @@ class TwinFootage(Footage):
         self._renderer, self._first, self._given = renderer, first, faults
         self._count = renderer.frame_count
         self._views = {name: at for at, name in enumerate(renderer.names)}
-        size = max(5 * camera.width * camera.height for camera in own.source.cameras)
-        self._drawn = LRUCache[tuple[str, int], tuple[Bytes, Bytes]](
-            max(2 * len(self._views), KEPT_BYTES // size)
-        )
+        self._drawn = LRUCache[tuple[str, int], DrawnSurface](KEPT_BYTES, lambda drawn: drawn.nbytes)
 
     def picture(self, camera: str, frame: int) -> Bytes:
         return self._seen(camera, frame)[0]
 
     def mask(self, camera: str, frame: int) -> Bytes | None:
-        return self._seen(camera, frame)[1]
+        view, at = self._views[camera], frame - self._first
+        source = (at + round(AWAY * self._count)) % self._count
+        source -= source % EVERY
+        return self._given.given_to(self._seen(camera, frame)[1], view, at, source)
 
     def has_masks(self, camera: str) -> bool:
         return True
@@ -109,14 +111,13 @@ class TwinFootage(Footage):
         return frozenset()
 
     def _seen(self, camera: str, frame: int) -> tuple[Bytes, Bytes]:
-        key = camera, frame
-        seen = self._drawn.get(key)
-        if seen is None:
-            view, at = self._views[camera], frame - self._first
-            picture, mask = self._renderer.seen(view, at)
-            source = (at + round(AWAY * self._count)) % self._count
-            seen = self._drawn[key] = picture, self._given.given_to(mask, view, at, source)
-        return seen
+        key, view = (camera, frame), self._views[camera]
+        drawn = self._drawn.get(key)
+        if drawn is None:
+            drawn = self._renderer.surface(view, frame - self._first)
+            if drawn is not None and drawn.nbytes <= KEPT_BYTES:
+                self._drawn[key] = drawn
+        return self._renderer.seen(view, drawn)
 
 
 def points_of(body: BodyModel) -> tuple[str, ...]:
@@ -183,7 +184,8 @@ def _measured(
 ) -> MaskFaults:
     """The faults of the run's own masks."""
     faults, makers = MaskFaults(run.body, cameras, poses), dict[object, EvidenceMaker]()
-    for at, frame in enumerate(frames):
+    for at in range(0, len(frames), EVERY):
+        frame = frames[at]
         progress("what the masks get wrong", at, len(frames))
         settings = run.settings(frame).evidence
         maker = makers.setdefault(settings, EvidenceMaker(cameras, footage, backgrounds, settings, "none"))
@@ -251,7 +253,7 @@ def _girth(
         drawn = _renderer(cameras, pictures, tables[rows], labels, 1.0, 1, 0)
         areas.append(
             sum(
-                int(np.count_nonzero(drawn.seen(view, at)[1]))
+                int(np.count_nonzero(drawn.seen(view, drawn.surface(view, at))[1]))
                 for at in range(len(rows))
                 for view in range(len(cameras))
             )
