@@ -845,13 +845,52 @@ function coverage(sheet, { frames: rows, correlation, pit }, at) {
 const LEVELS = [50, 80, 95];
 const percent = (share) => (share === null ? "none" : `${Math.round(100 * share)} %`);
 
+/** Where a joint is over the frames, with bands of its half width. */
+function drawPath(sheet, box, path, at) {
+  const rows = path.filter((row) => row.point === path[0].point);
+  const plot = sheet.plot(box, {
+    title: rows.length ? `Where ${rows[0].point} is` : "Where a joint is",
+    unit: rows.length ? `mm, band: ± ${figure(rows[0].half_width)} mm` : "",
+    names: ["x", "y", "z"],
+    x: categories(
+      rows.map((row) => String(row.frame)),
+      "frame",
+    ),
+    y: numbers("", { scale: true }),
+    click: (x) => (rows[Math.round(x)] ? { frame: rows[Math.round(x)].frame } : null),
+  });
+  ["x", "y", "z"].forEach((axis, index) => {
+    const band = { type: "line", symbol: "none", silent: true, stack: axis, stackStrategy: "all" };
+    const [colour, none] = [seriesColour(index), { opacity: 0 }];
+    sheet.series(plot, {
+      ...band,
+      lineStyle: none,
+      data: rows.map((row) => row[axis] - row.half_width),
+    });
+    sheet.series(plot, {
+      ...band,
+      lineStyle: none,
+      areaStyle: { color: colour, opacity: 0.18 },
+      data: rows.map((row) => 2 * row.half_width),
+    });
+    sheet.line(
+      plot,
+      axis,
+      rows.map((row) => row[axis]),
+      colour,
+      { symbols: false },
+    );
+  });
+  if (rows.length) sheet.chosen(plot, { column: String(at.frame) });
+}
+
 /** Uncertainty: half widths by joint, and how often they hold beside how often that is promised. */
-function uncertainty(sheet, { joints, coverage: shares }, at) {
-  const [one, two] = sheet.columns(2, {
+function uncertainty(sheet, { joints, coverage: shares, path }, at) {
+  const [one, two, three] = sheet.columns(3, {
     height: Math.max(120, at.room - 76),
-    least: [220, 0],
-    gutters: [62, 56],
-    shares: [1.6, 1],
+    least: [220, 0, 0],
+    gutters: [62, 56, 62],
+    shares: [1.5, 1, 1.5],
     right: 20,
   });
   const names = joints.map((row) => row.point);
@@ -926,6 +965,7 @@ function uncertainty(sheet, { joints, coverage: shares }, at) {
     token("text-quiet"),
     { dashed: true, symbols: false, silent: true },
   );
+  drawPath(sheet, three, path, at);
   const last = known.at(-1);
   if (!last) return "";
   const widest = joints.reduce((most, row) =>

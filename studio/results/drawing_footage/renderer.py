@@ -290,7 +290,7 @@ def _view_before(camera: Camera, samples: int, picture: Bytes) -> _View:
     """A camera's constant data where a picture (H, W, 3), BGR grey levels, stands for the room."""
     shape = (camera.height, camera.width)
     levels = np.clip(np.asarray(picture, np.float32)[..., ::-1], 0.0, LIGHTEST)
-    light = np.ascontiguousarray(-np.log(1.0 - levels / np.float32(255.0)) / np.float32(EXPOSURE))
+    light = np.ascontiguousarray(-np.log(1.0 - levels / 255.0) / EXPOSURE, dtype=np.float32)
     depth = np.full(shape, FAR_AWAY, np.float32)
     nothing = np.zeros((0, 0, 2), np.float32)
     return _View(camera, pixel_rays(camera, samples), light, nothing, depth, nothing)

@@ -202,7 +202,7 @@ def words_of(known: Uncertainty) -> tuple[str, ...]:
 def true_coverage(run: InspectedRun, known: Uncertainty) -> dict[str, tuple[float | None, ...]]:
     """By point, the share of frames whose true point is within each half width; {} without a truth."""
     track = reported(run.run)
-    truth = {at: true_points(run, int(frame)) for at, frame in enumerate(track.frames)}
+    truth = {at: true_points(run, frame) for at, frame in enumerate(track.frames.tolist())}
     known_points = {at: points for at, points in truth.items() if points is not None}
     if not known_points:
         return {}

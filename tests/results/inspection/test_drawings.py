@@ -223,6 +223,11 @@ def test_half_widths_and_how_often_they_hold_are_drawn(
     for level in (50, 80, 95):
         (line,) = points(series, f"{level} %")
         assert line == answer.table("joints").column(f"within_{level}")
+    path = answer.table("path").records()
+    (height,) = points(series, "z")
+    assert height == [row["z"] for row in path]
+    areas = [one["data"] for one in series if one.get("areaStyle")]
+    assert areas == [[2.0 * row["half_width"] for row in path]] * 3
     (found,) = points(series, "drawn again", "scatter")
     rows = answer.table("coverage").records()
     assert found == [[row["promised"], row["found"]] for row in rows]

@@ -20,6 +20,7 @@ from studio.results.inspection.views import look_over
 from studio.results.uncertainty import half_widths as module
 from studio.results.uncertainty.half_widths import (
     FILE_NAME,
+    WIDER,
     Uncertainty,
     frames_of_twin,
     kept_uncertainty,
@@ -139,9 +140,9 @@ def test_errors_of_a_known_size_give_their_half_widths(measured: InspectedRun) -
     assert known.alike == 1
     for one in known.points:
         assert one.bias_mm == pytest.approx((30.0, 0.0, 0.0), abs=0.3)
-        assert one.half_widths_mm[0] == pytest.approx(30.0, abs=0.3)
+        assert one.half_widths_mm[0] == pytest.approx(WIDER * 30.0, abs=0.3)
         # Half, 80 and 95 % of the lengths of vectors of three normal numbers are below these.
-        assert one.scatter_mm == pytest.approx((1.54, 2.15, 2.80), abs=0.25)
+        assert np.divide(one.scatter_mm, WIDER) == pytest.approx((1.54, 2.15, 2.80), abs=0.25)
         assert one.found == pytest.approx((0.5, 0.8, 0.95), abs=0.03)
 
 
@@ -165,6 +166,12 @@ def test_the_tables_have_what_is_kept(measured: InspectedRun) -> None:
     assert [row["promised"] for row in coverage[:3]] == [0.5, 0.8, 0.95]
     assert 0.0 <= coverage[0]["true"] <= 1.0
     assert len(shown.table("faults").rows) == 4
+    path = shown.table("path").records()
+    assert len({row["point"] for row in path}) == 1
+    assert [row["frame"] for row in path] == list(range(FRAMES))
+    names = [marker.name for marker in measured.body.markers]
+    places = marker_points(measured.body, reported(measured.run).poses)[:, names.index(str(path[0]["point"]))]
+    assert [[row["x"], row["y"], row["z"]] for row in path] == places.tolist()
     arms = look_over(measured, "uncertainty", Selection(limb="left arm")).table("joints").column("point")
     assert arms == ["LShoulder", "LElbow", "LWrist"]
 
