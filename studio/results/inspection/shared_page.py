@@ -25,6 +25,7 @@ from studio.results.inspection.reading import InspectedRun, no_value
 from studio.results.inspection.tables import Selection, Table, Viewed
 from studio.results.inspection.views import look, look_over, view_named
 from studio.results.self_contained import self_contained_page
+from studio.results.uncertainty.half_widths import kept_uncertainty
 from studio.runs.notes import notes_by_frame
 from studio.runs.tracks import RAW, read_track
 from studio.search.settings import all_knobs, settings_from_values, values
@@ -94,13 +95,15 @@ def shared_page(
         )
     shown = _Shown(run, track or RAW, frame, _some(finished, *searched), len(finished))
     figures: list[dict[str, Any]] = []
-    total = 2 + len(OVER_RUN) + len(OF_FRAME)
+    kept = kept_uncertainty(run)
+    over_run = OVER_RUN if kept.of is None or kept.stale else (*OVER_RUN, "uncertainty")
+    total = 2 + len(over_run) + len(OF_FRAME)
     parameter = _most_settled(look(run, frame, "variance", Selection()))
-    for done, name in enumerate(OVER_RUN):
+    for done, name in enumerate(over_run):
         progress(f"view {name}", done, total)
         selection = Selection(track=track, parameter=parameter)
         figures.append(_figure(shown, name, look_over(run, name, selection), None))
-    for done, name in enumerate(OF_FRAME, len(OVER_RUN)):
+    for done, name in enumerate(OF_FRAME, len(over_run)):
         progress(f"view {name} of frame {frame}", done, total)
         figures.append(_figure(shown, name, look(run, frame, name, Selection(track=track)), frame))
     progress("why", total - 2, total)

@@ -15,6 +15,7 @@ from studio.body.person import marker_motion
 from studio.foundations.errors import RunError
 from studio.foundations.progress import no_progress
 from studio.results.inspection.reading import InspectedRun
+from studio.results.inspection.shared_page import shared_page
 from studio.results.inspection.tables import Selection
 from studio.results.inspection.views import look_over
 from studio.results.uncertainty import half_widths as module
@@ -174,6 +175,13 @@ def test_the_tables_have_what_is_kept(measured: InspectedRun) -> None:
     assert [[row["x"], row["y"], row["z"]] for row in path] == places.tolist()
     arms = look_over(measured, "uncertainty", Selection(limb="left arm")).table("joints").column("point")
     assert arms == ["LShoulder", "LElbow", "LWrist"]
+
+
+def test_a_shared_page_has_what_holds(own: InspectedRun) -> None:
+    figures = '"view":"uncertainty"'
+    assert figures in shared_page(own, 2).replace(" ", "")
+    (own.run.folder / FILE_NAME).unlink()
+    assert figures not in shared_page(own, 2).replace(" ", "")
 
 
 def test_words_say_what_is_promised_and_what_is_not(measured: InspectedRun) -> None:
