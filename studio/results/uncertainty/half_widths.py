@@ -215,9 +215,9 @@ def true_coverage(run: InspectedRun, known: Uncertainty) -> dict[str, tuple[floa
     off: Array = np.linalg.norm(reports - np.stack([*known_points.values()]), axis=2)
     shares: dict[str, tuple[float | None, ...]] = {}
     for at, point in enumerate(known.points):
-        measured = off[np.isfinite(off[:, at]), at]
+        measured: Array = off[np.isfinite(off[:, at]), at]
         shares[point.point] = tuple(
-            float(np.mean(measured <= width)) if width is not None and len(measured) else None
+            float(np.mean(np.less_equal(measured, width))) if width is not None and len(measured) else None
             for width in point.half_widths_mm
         )
     return shares
