@@ -47,10 +47,10 @@ FEWEST_FRAMES = 8
 UNSEEN = (LOST, NO_EVIDENCE)
 WIDER = 1.3
 """By what a twin's errors are multiplied: its motion is one that the tracker finds, and its person is built as drawn
-people are. On five drawn clips of the choosing half (walk, kick, leap, turns, dance) errors are 1.2 to 1.6 times their
-twins' in the mean; with 1.3, 51 and 84 % of frames are within what is promised for 50 and 80 %. Neither the cloud's
-spread nor how well silhouettes agree ranks the errors within a run (|ρ| < 0.25 for joints of turns and dance), so a
-joint has the same half width in all frames.
+people are. On six drawn clips of the choosing half (walk, kick, leap, turns, dance, arms) errors are 1.2 to 1.6 times
+their twins' in the mean; with 1.3, 54 and 85 % of frames are within what is promised for 50 and 80 %. Divided by how
+much silhouettes disagree in each frame, half widths are as wide and hold as often (turns, dance), so a joint has the
+same in all frames.
 """
 STALE = "the run's poses, its masks or its cameras have changed"
 REMEDY = "Its joints have no half widths; 'evaluate' measures it where there is a truth."
