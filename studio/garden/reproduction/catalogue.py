@@ -30,6 +30,7 @@ from studio.garden.reproduction.open_questions import (
     error_split,
     evaluations,
     generalisation,
+    half_widths,
     likelihood_scale,
     other_people,
     planted_losses,
@@ -69,6 +70,7 @@ MODULES = (
     tempered_people,
     likelihood_scale,
     error_split,
+    half_widths,
     start_poses,
     defaults,
 )

@@ -155,7 +155,7 @@ def track_twin(run: InspectedRun, frames: range, progress: Progress) -> TwinErro
             run.session, twin.body(), cameras, last=frames.stop, executor=ahead, footage=footage
         )
         with closing(problems):
-            _track(twin, problems, progress)
+            track_to_end(twin, problems, lambda done, total: progress("tracking the twin", done, total))
         found = reported(twin).poses
         errors = body_points(twin.body(), found) - truth
         turns = joint_frames(twin.body(), found)[:, carriers_of(body), :, :3]
@@ -325,12 +325,11 @@ def _shaped(
     return shape.body, tuple(float(value) for value in shape.start)
 
 
-def _track(twin: StoredRun, problems: ProblemSource, progress: Progress) -> None:
-    record = twin.record
-    with closing(TrackingRun(twin, problems)) as tracking:
+def track_to_end(run: StoredRun, problems: ProblemSource, step: Callable[[int, int], None]) -> None:
+    """Track a prepared run, and put its sides right as a whole. step : is told the frames done and their number."""
+    total = run.record.frame_count
+    with closing(TrackingRun(run, problems)) as tracking:
         while not tracking.finished:
-            progress("tracking the twin", tracking.done, record.frame_count)
+            step(tracking.done, total)
             tracking.step_layer()
-    correct_clip(
-        twin, problems, lambda _: progress("tracking the twin", record.frame_count, record.frame_count)
-    )
+    correct_clip(run, problems, lambda _: step(total, total))
