@@ -3,6 +3,7 @@
 import numpy as np
 
 from studio.foundations.arrays import Array
+from studio.foundations.errors import SessionError
 from studio.results.export.naming import Points
 from studio.results.export.task import ExportTask
 from studio.results.inspection.reading import InspectedRun
@@ -19,9 +20,12 @@ MEANS = (
 def half_widths_of(task: ExportTask, points: Points) -> tuple[Array | None, tuple[str, ...]]:
     """(K, M) half widths of the points, mm, NaN in gaps and where none is known; and notes for the file's readers.
 
-    None where the run has none: they were not measured, no longer hold, or are of another track.
+    None where the run has none: they were not measured, cannot be read, no longer hold, or are of another track.
     """
-    kept = kept_uncertainty(InspectedRun(task.session, task.run))
+    try:
+        kept = kept_uncertainty(InspectedRun(task.session, task.run))
+    except SessionError as problem:
+        return None, (str(problem),)
     if kept.of is None:
         return None, ()
     if kept.stale:

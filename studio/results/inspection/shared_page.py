@@ -95,8 +95,7 @@ def shared_page(
         )
     shown = _Shown(run, track or RAW, frame, _some(finished, *searched), len(finished))
     figures: list[dict[str, Any]] = []
-    kept = kept_uncertainty(run)
-    over_run = OVER_RUN if kept.of is None or kept.stale else (*OVER_RUN, "uncertainty")
+    over_run = (*OVER_RUN, "uncertainty") if _has_half_widths(run) else OVER_RUN
     total = 2 + len(over_run) + len(OF_FRAME)
     parameter = _most_settled(look(run, frame, "variance", Selection()))
     for done, name in enumerate(over_run):
@@ -296,6 +295,15 @@ def _over_frames(shown: _Shown) -> dict[str, Any]:
         "notes": [],
         "tables": [table],
     }
+
+
+def _has_half_widths(run: InspectedRun) -> bool:
+    """Whether there are some that hold."""
+    try:
+        kept = kept_uncertainty(run)
+    except SessionError:
+        return False
+    return kept.of is not None and not kept.stale
 
 
 def _figure(shown: _Shown, name: str, viewed: Viewed, frame: int | None) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from studio.body.motion_files.trc import read_trc
 from studio.results.export.exporting import ExportReport, export_run
 from studio.results.export.formats import FORMATS
 from studio.results.inspection.reading import InspectedRun
+from studio.results.inspection.shared_page import shared_page
 from studio.results.uncertainty.half_widths import FILE_NAME, Uncertainty
 from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.results_store import ResultsWriter
@@ -115,3 +116,11 @@ def test_half_widths_of_a_run_that_has_changed_are_not_exported(known: Inspected
     report = export(known, tmp_path / "walk.trc")
     assert [path.name for path in report.files] == ["walk.trc"]
     assert any("no longer hold" in note for note in report.notes)
+
+
+def test_a_file_that_cannot_be_read_spoils_no_export(known: InspectedRun, tmp_path: Path) -> None:
+    (known.run.folder / FILE_NAME).write_text("{")
+    report = export(known, tmp_path / "walk.csv")
+    assert "within" not in report.files[0].read_text().splitlines()[0]
+    assert any("cannot be read" in note for note in report.notes)
+    assert '"view":"uncertainty"' not in shared_page(known, 2).replace(" ", "")
