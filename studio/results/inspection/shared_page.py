@@ -16,7 +16,7 @@ from studio.body.forward_kinematics import limb_ends
 from studio.body.model import extremities
 from studio.body.motion_files.trc import read_trc
 from studio.foundations.arrays import Array
-from studio.foundations.errors import NotFoundError, RunError, StudioError
+from studio.foundations.errors import NotFoundError, RunError, SessionError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.package import software_version
 from studio.foundations.progress import Progress, no_progress
