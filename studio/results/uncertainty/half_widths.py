@@ -18,7 +18,6 @@ from studio.body.model import BodyModel
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
 from studio.foundations.arrays import Array
-from studio.foundations.errors import RunError
 from studio.foundations.progress import Progress
 from studio.foundations.words import counted, enumerated
 from studio.results.inspection.reading import InspectedRun
@@ -33,7 +32,14 @@ from studio.results.uncertainty.conformal import (
     without_bias,
 )
 from studio.results.uncertainty.mask_faults import FaultShares
-from studio.results.uncertainty.twin import TwinErrors, carriers_of, points_of, reported, track_twin
+from studio.results.uncertainty.twin import (
+    TwinErrors,
+    carriers_of,
+    not_promised,
+    points_of,
+    reported,
+    track_twin,
+)
 from studio.runs.tracks import track_digest
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.tracker import LOST, NO_EVIDENCE
@@ -53,7 +59,6 @@ much silhouettes disagree in each frame, half widths are as wide and hold as oft
 same in all frames.
 """
 STALE = "the run's poses, its masks or its cameras have changed"
-REMEDY = "Its joints have no half widths; 'evaluate' measures it where there is a truth."
 NOT_IN_IT = (
     "Not in it: a calibration that is off, cameras out of step, things in front of the body, and a body or clothes of"
     " another build than the drawn one's."
@@ -228,7 +233,7 @@ def frames_of_twin(run: InspectedRun) -> range:
     record, track = run.run.record, reported(run.run)
     frames = range(record.first, record.first + len(track.frames))
     if why := _why_none(run, frames, track.frames.tolist(), track.states):
-        raise RunError(f"How far off run '{run.run.name}' is cannot be promised: {why}.", REMEDY)
+        raise not_promised(run.run, why)
     return frames
 
 

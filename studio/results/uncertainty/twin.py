@@ -28,6 +28,7 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
 from studio.footage.capture.footage import Footage
 from studio.foundations.arrays import Array, Bytes, evenly_spread
+from studio.foundations.errors import RunError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import Value
 from studio.foundations.progress import Progress
@@ -60,6 +61,11 @@ SAMPLES, NOISE = 1, 2.5
 GIRTHS, GIRTH_FRAMES, GIRTH_LIMITS = (0.9, 1.1), 4, (0.6, 1.6)
 KEPT_BYTES = 256 << 20
 """Of what was drawn, where the body is: a person in four small pictures takes a MB a frame."""
+MOST_MISSING = 0.15
+"""Of the choosing half's clips whose errors are at most 1.6 times their twins', no camera's masks lack more than 6 % of
+the body; where boxes hide it (39 %), errors are twice their twins'.
+"""
+REMEDY = "Its joints have no half widths; 'evaluate' measures it where there is a truth."
 EVERY = 2
 """Masks are compared with silhouettes in every so many frames; the others have the faults of the one before."""
 OWN_MASKS: Mapping[str, Value] = {
@@ -120,6 +126,11 @@ class TwinFootage(Footage):
         return self._renderer.seen(view, drawn)
 
 
+def not_promised(run: StoredRun, why: str) -> RunError:
+    """The error for a run of which a twin would promise too much. why : a clause."""
+    return RunError(f"How far off run '{run.name}' is cannot be promised: {why}.", REMEDY)
+
+
 def points_of(body: BodyModel) -> tuple[str, ...]:
     """(M,) names of the body's points: its markers, or its limbs, whose far ends are meant, where it has none."""
     return tuple(one.name for one in (body.markers or body.drawn))
@@ -137,7 +148,10 @@ def carriers_of(body: BodyModel) -> list[int]:
 
 
 def track_twin(run: InspectedRun, frames: range, progress: Progress) -> TwinErrors:
-    """Draw and track a run's twin. frames : of the run, each with a pose. What a progress raises ends it."""
+    """Draw and track a run's twin. frames : of the run, each with a pose. What a progress raises ends it.
+
+    Raises RunError where the masks lack too much of the body.
+    """
     record, body = run.run.record, run.body
     poses = reported(run.run).poses[: len(frames)]
     with ExitStack() as open_things:
@@ -145,6 +159,13 @@ def track_twin(run: InspectedRun, frames: range, progress: Progress) -> TwinErro
         cameras = run.run.cameras()
         backgrounds = Backgrounds(own)
         faults = _measured(run, frames, poses, cameras, own, backgrounds, progress)
+        for one in faults.shares():
+            if one.holes + one.empty > MOST_MISSING:
+                raise not_promised(
+                    run.run,
+                    f"{100.0 * (one.holes + one.empty):.0f} % of the body are missing in the masks of {one.camera}, so"
+                    " that something hides it, or it is elsewhere",
+                )
         pictures = [_empty_place(backgrounds, camera.name) for camera in cameras]
         renderer, truth = _drawn(body, poses, cameras, pictures, record.fps, record.seed)
         del backgrounds

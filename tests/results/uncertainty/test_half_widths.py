@@ -19,6 +19,7 @@ from studio.results.inspection.shared_page import shared_page
 from studio.results.inspection.tables import Selection
 from studio.results.inspection.views import look_over
 from studio.results.uncertainty import half_widths as module
+from studio.results.uncertainty import twin
 from studio.results.uncertainty.half_widths import (
     FILE_NAME,
     WIDER,
@@ -231,6 +232,17 @@ def test_few_frames_lost_ones_and_cameras_that_are_gone_are_refused(
         writer.forget_from(5)
     with pytest.raises(RunError, match="it has 5 finished frames, and 8 are needed"):
         frames_of_twin(own)
+
+
+def test_masks_that_lack_much_of_the_body_are_refused(
+    own: InspectedRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    least = max(one.holes for one in kept_of(own).faults)
+    monkeypatch.setattr(twin, "MOST_MISSING", 0.99 * least)
+    with pytest.raises(
+        RunError, match=r"cannot be promised: .* % of the body are missing in the masks of cam"
+    ):
+        measure_uncertainty(own, no_progress, again=True)
 
 
 def test_a_likelihood_that_reads_colours_is_refused(own: InspectedRun) -> None:
