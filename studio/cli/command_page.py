@@ -18,16 +18,25 @@ def command_page() -> str:
     for name in COMMANDS:
         command = main.get_command(context, name)
         assert command is not None
-        inner = click.Context(command, info_name=name, parent=context)
-        usage = " ".join(["studio", name, *command.collect_usage_pieces(inner)])
-        parts.append(f"## {name}\n\n`{usage}`\n\n{_paragraphs(command.help or '')}\n")
-        listed = [entry for entry in command.params if isinstance(entry, click.Option)]
-        rows = [record for entry in listed if (record := entry.get_help_record(inner))]
-        if rows:
-            parts.append("| option | what it does |\n|---|---|")
-            parts += [f"| `{_cell(option)}` | {_cell(help_text)} |" for option, help_text in rows]
-            parts.append("")
+        parts += _section(command, name, context)
     return "\n".join(parts)
+
+
+def _section(command: click.Command, name: str, context: click.Context) -> list[str]:
+    """A command with its options, and those that stand below it."""
+    inner = click.Context(command, info_name=name.rpartition(" ")[2], parent=context)
+    usage = " ".join(["studio", name, *command.collect_usage_pieces(inner)])
+    parts = [f"## {name}\n\n`{usage}`\n\n{_paragraphs(command.help or '')}\n"]
+    listed = [entry for entry in command.params if isinstance(entry, click.Option)]
+    rows = [record for entry in listed if (record := entry.get_help_record(inner))]
+    if rows:
+        parts.append("| option | what it does |\n|---|---|")
+        parts += [f"| `{_cell(option)}` | {_cell(help_text)} |" for option, help_text in rows]
+        parts.append("")
+    if isinstance(command, click.Group):
+        for below, one in command.commands.items():
+            parts += _section(one, f"{name} {below}", inner)
+    return parts
 
 
 def _paragraphs(text: str) -> str:

@@ -49,6 +49,7 @@ COMMANDS = {
     "branch": ("tracking_commands", "operations.tracking.branch"),
     "compare": ("comparison_commands", "operations.comparing.compare"),
     "sweep": ("comparison_commands", "operations.comparing.sweep"),
+    "arena": ("arena_commands", "cli.arena_commands.arena_command"),
     "learn": ("behaviour_commands", "operations.behaviours.learn"),
     "models": ("behaviour_commands", "operations.behaviours.models"),
     "note": ("note_commands", "operations.notes.note"),

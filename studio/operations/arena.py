@@ -1,0 +1,261 @@
+"""The arena: frames as black-box problems, and races of optimisers on them."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from studio.foundations.declaring import Terminal, Web, operation
+from studio.foundations.errors import RunError
+from studio.foundations.progress import Progress
+from studio.operations.jobs.trials import TrialResult, run_jobs
+from studio.operations.opening import RunName, keeping_in_place, open_run, session_of
+from studio.operations.progress import Reporting, reporting
+from studio.results.arena.making import REFERENCE, problems_of_run
+from studio.results.arena.problem import ArenaError, Definition, Problem
+from studio.results.arena.problem_files import write_problems
+from studio.results.arena.profiles import Trial
+from studio.results.arena.racers import RACERS, Racer, racer_named
+from studio.results.arena.race_files import RaceDocument, race_document, write_race
+from studio.results.arena.racing import as_trial, chosen, defined_in, measure_race, planned
+from studio.results.comparison import trials as kinds
+from studio.results.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by, plain
+from studio.results.comparison.trials import Outcome, TrialJob, measure_name
+from studio.results.inspection.reading import InspectedRun
+from studio.sessions.atomic_files import writing
+from studio.sessions.manifest import now
+from studio.sessions.process_lock import ProcessLock
+from studio.sessions.workspace import workspace_root
+
+ARENA, TRIALS, LOCK = "arena", "trials", "arena.lock"
+"""Folder of races in the workspace, and what is in it."""
+KEY_LENGTH = 24
+
+ProblemFile = Annotated[
+    str | Path,
+    Field(description="A set of problems that was exported; default: the bundled one."),
+    Terminal("--file", kind=Path, metavar="FILE"),
+]
+Reference = Annotated[
+    int, Field(ge=1000, le=1_000_000_000, description="Poses that the search for the heaviest one weighs.")
+]
+Limbs = Annotated[
+    Sequence[str],
+    Field(
+        description="A limb or a parameter that is searched, the rest held as the run has it; default: all"
+    ),
+    Terminal("--limb", metavar="NAME"),
+]
+Frames = Annotated[
+    Sequence[int], Field(description="Finished frames, each a problem."), Terminal("--frames", required=True)
+]
+
+
+@operation
+def problems(file: ProblemFile = "") -> tuple[Problem, ...]:
+    """List frames as black-box problems for an optimiser, which calls `problem.log_likelihood(poses)`.
+
+    Each has bounds, a prior (start pose, σ0, last cloud of the frame before) and the heaviest pose that a long search
+    knows. No footage is needed: what the likelihood reads is in the file.
+
+    Raises ArenaError for a file that is missing or damaged.
+    """
+    return tuple(map(Problem, defined_in(str(file or ""))))
+
+
+@operation
+@keeping_in_place
+def problems_of(
+    run: RunName,
+    frames: Frames,
+    *,
+    limbs: Limbs = (),
+    evaluations: Reference = REFERENCE,
+    progress: Reporting = None,
+) -> tuple[Problem, ...]:
+    """Make problems of a run's frames, as its search began them, of any footage.
+
+    The heaviest pose of each is searched for first, some seconds a frame.
+
+    Raises NotFoundError for a frame that is not finished, ArenaError where the likelihood reads pictures or a hull.
+    """
+    return tuple(map(Problem, _defined(run, frames, limbs, evaluations, progress)))
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """A set of problems as a file. size : bytes."""
+
+    file: Path
+    problems: tuple[str, ...]
+    size: int
+
+
+@operation
+@keeping_in_place
+def export(
+    run: RunName,
+    to: Annotated[
+        str | Path, Field(description="The file to write, .npz."), Terminal("--to", kind=Path, metavar="FILE")
+    ],
+    frames: Frames,
+    *,
+    limbs: Limbs = (),
+    evaluations: Reference = REFERENCE,
+    progress: Reporting = None,
+) -> Exported:
+    """Write a run's frames as problems into one file of at most 20 MB, which needs no footage.
+
+    Raises as `problems_of`, and ArenaError for a set that is too large.
+    """
+    definitions = _defined(run, frames, limbs, evaluations, progress)
+    file = write_problems(definitions, Path(to))
+    return Exported(file, tuple(one.name for one in definitions), file.stat().st_size)
+
+
+def _defined(
+    run: RunName, frames: Sequence[int], limbs: Sequence[str], evaluations: int, progress: Reporting
+) -> tuple[Definition, ...]:
+    stored = open_run(run)
+    opened = InspectedRun(session_of(stored), stored)
+    if not frames:
+        raise ArenaError("No frame is named.", "Name finished frames, such as 10,20.")
+    with reporting(progress, f"{opened.session.name} / {opened.run.name}: searching for long") as report:
+        return problems_of_run(opened, frames, limbs, evaluations, report)
+
+
+def racers() -> tuple[Racer, ...]:
+    """All racers that are installed: trackers, CMA-ES, SciPy's, and those of packages."""
+    return tuple(RACERS.values())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Raced:
+    """A race.
+
+    trials : each racer on each problem with each seed: when it met heavier poses, and how near the known best they are.
+    document : charts and tables as plain JSON values.
+    folder : where the trials, `race.json` and the page `race.html` lie.
+    measured, kept : trials that were run now, and that were kept from before.
+    """
+
+    trials: tuple[Trial, ...]
+    document: RaceDocument
+    folder: Path
+    measured: int
+    kept: int
+
+
+@operation
+def race(
+    problems: Annotated[
+        Sequence[str],
+        Field(description="A problem by name, or all that are easy or hard; default: all"),
+        Terminal("--problem", metavar="NAME"),
+        Web(left_out=True),
+    ] = (),
+    racers: Annotated[
+        Sequence[str],
+        Field(description="A racer by name, or a Python file with one; default: all that are installed"),
+        Terminal("--racer", metavar="NAME"),
+        Web(left_out=True),
+    ] = (),
+    *,
+    evaluations: Annotated[
+        int, Field(ge=10, le=100_000_000, description="Poses that each racer may weigh of a problem.")
+    ] = 10_000,
+    seeds: Annotated[int, Field(ge=1, le=1000, description="Number of seeds of each racer, from 0 on.")] = 5,
+    file: ProblemFile = "",
+    out: Annotated[
+        str | Path | None,
+        Field(description="Folder of what is kept; default: 'arena' in the workspace."),
+        Terminal(kind=Path),
+    ] = None,
+    processes: Annotated[
+        int | None, Field(ge=1, description="Trials at once; default: one a core."), Web(left_out=True)
+    ] = None,
+    progress: Reporting = None,
+) -> Raced:
+    """Race optimisers on problems: how many evaluations each needs to come how near the heaviest known pose.
+
+    Every trial is kept as soon as it is done: after Ctrl-C the same call goes on, and a race with one racer more runs
+    that one alone. Writes `race.json` and a page, `race.html`.
+
+    Raises ArenaError for an unknown problem, and for a racer that raises, weighs nothing or gives a pose that is not
+    finite; UnknownMemberError for an unknown racer; RunError while another process races in the folder.
+    """
+    place = str(Path(file).absolute()) if file else ""
+    definitions = chosen(defined_in(place), problems)
+    named = tuple(str(Path(one).absolute()) if one.endswith(".py") else one for one in racers or RACERS)
+    wanted = planned(definitions, named, evaluations, range(seeds), place)
+    folder = Path(out).absolute() if out else workspace_root().absolute() / ARENA
+    with writing("The race", folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    lock = ProcessLock.take(folder / LOCK)
+    if lock is None:
+        raise RunError(f"Another process races in '{folder}'.", "Wait for it, or choose another folder.")
+    try:
+        with reporting(progress, "racing") as report:
+            outcomes, kept = _outcomes(wanted, KeptTrials(folder / TRIALS), report, processes)
+        labels = {racer_named(name).name: racer_named(name).label for name in named}
+        document = race_document(definitions, outcomes, labels, evaluations)
+        write_race(folder, document)
+    finally:
+        lock.free()
+    return Raced(tuple(map(as_trial, outcomes)), document, folder, len(wanted) - kept, kept)
+
+
+def _outcomes(
+    wanted: Sequence[kinds.Trial], kept: KeptTrials, report: Progress, processes: int | None
+) -> tuple[list[Outcome], int]:
+    """The outcomes of trials in their order, and how many were kept from before; missing ones are measured.
+
+    Raises ArenaError for a trial that fails.
+    """
+    keys = [_key(trial) for trial in wanted]
+    by_key = dict(zip(keys, wanted, strict=True))
+    outcomes = dict[str, Outcome]()
+    for key, trial in by_key.items():
+        known = kept.read(key)
+        if known is not None and known.measured is not None and known.software == measured_by():
+            outcomes[key] = Outcome(trial, known.measured)
+    before = len(outcomes)
+    report("", before, len(by_key))
+
+    def on_result(job: TrialJob, result: TrialResult) -> None:
+        if result.measured is None:
+            raise ArenaError(result.failure, "What was finished is kept; correct it and race again.")
+        values = result.measured
+        kept.write(
+            job.key,
+            KeptOutcome(values, "", result.seconds, measured_by(), now(), job.label, job.arguments),
+        )
+        outcomes[job.key] = Outcome(by_key[job.key], values)
+        report(job.label, len(outcomes), len(by_key))
+
+    jobs = [
+        TrialJob(key, ARENA, trial.label, plain(trial.arguments), measure_race, (), None, alone=False)
+        for key, trial in by_key.items()
+        if key not in outcomes
+    ]
+    if jobs:
+        report("starting", before, len(by_key))
+        run_jobs(
+            jobs,
+            kept.folder.parent,
+            on_result,
+            processes,
+            checkpoint=lambda: report("", len(outcomes), len(by_key)),
+        )
+    return [outcomes[key] for key in keys], before
+
+
+def _key(trial: kinds.Trial) -> str:
+    """What a trial's outcome is kept under: the same for the same problem, wherever its file lies."""
+    arguments: dict[str, Any] = {**trial.arguments, "set": ""}
+    made_by = json.dumps([measure_name(measure_race), arguments], sort_keys=True)
+    return hashlib.sha256(made_by.encode()).hexdigest()[:KEY_LENGTH]

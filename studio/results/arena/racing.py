@@ -1,0 +1,165 @@
+"""A racer on a problem as a trial: kept as other trials are, run in any process, not measured twice."""
+
+import hashlib
+import time
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from studio.foundations.errors import StudioError
+from studio.foundations.foreign_files import read_file
+from studio.results.arena.problem import ArenaError, BudgetSpentError, Definition, Problem
+from studio.results.arena.problem_files import BUNDLED, read_problems
+from studio.results.arena.profiles import Trial
+from studio.results.arena.racers import RACERS, SUFFIX, Racer, racer_named
+from studio.results.comparison import trials
+from studio.results.comparison.footage_cache import FootageCache
+from studio.results.comparison.kept_trials import code_digest
+from studio.results.comparison.trials import Outcome, kept_as
+
+DIGEST_LENGTH = 16
+CODE = ("results/arena",)
+SHOWN_AFTER = (10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000)
+"""Evaluations after which the pose of the first seed is kept, to be drawn."""
+
+
+def defined_in(place: str) -> tuple[Definition, ...]:
+    """The problems of a file, "" for the bundled ones. Raises ArenaError."""
+    path = Path(place) if place else BUNDLED
+    try:
+        return _read(path, path.stat().st_mtime_ns)
+    except FileNotFoundError:
+        raise ArenaError(
+            f"There is no set of problems '{path}'.", "Make one with `studio arena export`."
+        ) from None
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, stamp: int) -> tuple[Definition, ...]:
+    return read_problems(path)
+
+
+def chosen(definitions: Sequence[Definition], names: Sequence[str]) -> tuple[Definition, ...]:
+    """Problems by name, or by "easy" and "hard"; all for no name. Raises ArenaError for an unknown name."""
+    for name in names:
+        if not any(name in (one.name, one.kind) for one in definitions):
+            raise ArenaError(
+                f"There is no problem '{name[:64]}'.",
+                f"There are {', '.join(one.name for one in definitions)}; or say easy or hard.",
+            )
+    return tuple(one for one in definitions if not names or one.name in names or one.kind in names)
+
+
+def planned(
+    definitions: Sequence[Definition],
+    racers: Sequence[str],
+    evaluations: int,
+    seeds: Sequence[int],
+    place: str,
+) -> tuple[trials.Trial, ...]:
+    """A trial for each problem, racer and seed, problem by problem.
+
+    place : of the problems' file, "" for the bundled ones. Raises ArenaError, UnknownMemberError for a racer.
+    """
+    known = {name: (racer_named(name).name, _code_of(name)) for name in racers}
+    if len({name for name, _ in known.values()}) < len(racers):
+        raise ArenaError("Two racers have the same name.", "Give each its own, and name each once.")
+    return tuple(
+        trials.Trial(
+            f"{known[name][0]} on {one.name}, seed {seed}",
+            {
+                "set": place,
+                "problem": one.name,
+                "hash": "" if one.best is None else one.best.hash,
+                "racer": name,
+                "name": known[name][0],
+                "code": known[name][1],
+                "evaluations": evaluations,
+                "seed": seed,
+            },
+        )
+        for one in definitions
+        for name in racers
+        for seed in seeds
+    )
+
+
+def _code_of(name: str) -> str:
+    """What changes when a racer does: a digest of the arena's code, or a package's version, or the file's own."""
+    if name.endswith(SUFFIX):
+        return hashlib.sha256(read_file(Path(name))).hexdigest()[:DIGEST_LENGTH]
+    return " ".join((code_digest(CODE), *RACERS.packages))
+
+
+@kept_as("arena.measure_race")
+def measure_race(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Run a racer on a problem: evaluations, seconds and those of the likelihood alone, the way from the start pose, at
+    which counts heavier poses were met and how far they are from the known best, and poses of the first seed.
+
+    Raises ArenaError for a problem that is another by now, and for what the racer raises.
+    """
+    (definition,) = chosen(defined_in(arguments["set"]), [arguments["problem"]])
+    best = definition.best
+    if best is None or best.hash != arguments["hash"]:
+        raise ArenaError(f"Problem '{definition.name}' has changed meanwhile.", "Begin the race again.")
+    problem = Problem(definition, arguments["evaluations"])
+    began = time.perf_counter()
+    run_racer(racer_named(arguments["racer"]), problem, arguments["seed"])
+    seconds = time.perf_counter() - began
+    drawn = poses_after(problem, SHOWN_AFTER) if arguments["seed"] == 0 else {}
+    return {
+        "evaluations": problem.evaluations,
+        "seconds": round(seconds, 4),
+        "seconds_weighing": round(problem.seconds, 4),
+        "way": best.log_weight - problem.start_log_weight,
+        "reached": [one.evaluations for one in problem.improvements],
+        "gaps": [best.log_weight - one.log_weight for one in problem.improvements],
+        "poses": {str(count): pose for count, pose in drawn.items()},
+    }
+
+
+def run_racer(racer: Racer, problem: Problem, seed: int) -> None:
+    """Let a racer search a problem until it ends or the budget is spent.
+
+    Raises ArenaError for what it raises, and where it weighs no pose.
+    """
+    where = f"Racer '{racer.name}' on problem '{problem.name}' with seed {seed}"
+    try:
+        racer.search(problem, seed)
+    except BudgetSpentError:
+        return
+    except StudioError as error:
+        raise ArenaError(f"{where}: {error.message}", error.hint) from error
+    except Exception as error:
+        raise ArenaError(
+            f"{where} failed with {trials.failure_in_words(error)}.", "Correct the racer and race again."
+        ) from error
+    if not problem.evaluations:
+        raise ArenaError(
+            f"{where} weighed no pose.", "Let it call problem.log_likelihood(poses) until that ends it."
+        )
+
+
+def poses_after(problem: Problem, counts: Sequence[int]) -> dict[int, list[float]]:
+    """The heaviest pose (D,) after so many evaluations, of those counts that were reached and found one."""
+    shown = dict[int, list[float]]()
+    for count in counts:
+        until = [one for one in problem.improvements if one.evaluations <= count]
+        if until and count <= problem.evaluations:
+            shown[count] = until[-1].pose.tolist()
+    return shown
+
+
+def as_trial(outcome: Outcome) -> Trial:
+    """A measured outcome as profiles take it."""
+    arguments, measured = outcome.trial.arguments, outcome.measured
+    return Trial(
+        arguments["problem"],
+        arguments["name"],
+        arguments["seed"],
+        measured["evaluations"],
+        tuple(measured["reached"]),
+        tuple(measured["gaps"]),
+        measured["way"],
+    )
