@@ -2,7 +2,7 @@
 
 For scripts and notebooks, the verbs of the command line as functions: `import studio`, then `studio.open_session`,
 `studio.track` and so on (`dir(studio)` lists them, the guide has a page of examples). Each is imported on first
-use, so that `import studio` costs nothing.
+use, so that `import studio` costs nothing. `studio.arena` has the arena's.
 """
 
 import importlib
@@ -64,11 +64,14 @@ _VERBS = {
     ),
     "studio.cli.self_check": ("doctor",),
 }
+ARENA = "arena"
 _MODULE_OF = {name: module for module, names in _VERBS.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    """A verb, imported on first use."""
+    """A verb, or the arena, imported on first use."""
+    if name == ARENA:
+        return importlib.import_module(f"studio.{ARENA}")
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'studio' has no attribute '{name}'")
     verb = getattr(importlib.import_module(_MODULE_OF[name]), name)
@@ -79,5 +82,5 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """The verbs."""
-    return sorted(_MODULE_OF)
+    """The verbs, and the arena."""
+    return sorted((*_MODULE_OF, ARENA))

@@ -1,5 +1,6 @@
 # What editors and type checkers know of `studio`: the verbs, which `__init__.py` imports on first use.
 
+from studio import arena as arena
 from studio.cli.diagnostics_archive import diagnostics as diagnostics
 from studio.cli.self_check import doctor as doctor
 from studio.foundations.errors import StudioError as StudioError

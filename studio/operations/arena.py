@@ -19,8 +19,8 @@ from studio.results.arena.making import REFERENCE, problems_of_run
 from studio.results.arena.problem import ArenaError, Definition, Problem
 from studio.results.arena.problem_files import write_problems
 from studio.results.arena.profiles import Trial
-from studio.results.arena.racers import RACERS, Racer, racer_named
 from studio.results.arena.race_files import RaceDocument, race_document, write_race
+from studio.results.arena.racers import RACERS, Racer, racer_named
 from studio.results.arena.racing import as_trial, chosen, defined_in, measure_race, planned
 from studio.results.comparison import trials as kinds
 from studio.results.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by, plain

@@ -72,6 +72,7 @@ OTHERS = {
     "correct": "minutes",
     "branch": "tracks",
     "compare": "minutes",
+    "arena": "no session, but for export, which reads as split-error does; minutes",
     "sweep": "minutes",
     "learn": "minutes",
     "models": "no session",

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from test_house_rules import ROOT
 
 import studio
-from studio import extending
+from studio import arena, extending
 from studio.app.server.app import ROUTES
 
 BEHIND = ("studio.sessions.", "studio.runs.", "studio.footage.", "studio.results.")
@@ -112,12 +112,17 @@ def test_the_server_has_few_answers_of_its_own_and_none_repeats_a_record() -> No
 
 def test_booleans_are_given_by_name_alone() -> None:
     """To verbs, and to what packages that add to the studio take."""
-    functions = {f"studio.{name}": getattr(studio, name) for name in dir(studio) if name != "StudioError"}
-    for name in dir(extending):
-        one = getattr(extending, name)
+    others = ("StudioError", "arena")
+    functions = {f"studio.{name}": getattr(studio, name) for name in dir(studio) if name not in others}
+    offered = [
+        (module.__name__, name, getattr(module, name))
+        for module in (extending, arena)
+        for name in dir(module)
+    ]
+    for module, name, one in offered:
         members = vars(one).items() if inspect.isclass(one) else [("", one)]
         functions |= {
-            f"studio.extending.{name}.{part}": member
+            f"{module}.{name}.{part}": member
             for part, member in members
             if inspect.isfunction(member) and not part.startswith("_")
         }

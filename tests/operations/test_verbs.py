@@ -14,7 +14,7 @@ from toy_footage import write_video
 from toy_session import BODY, HEIGHT, WIDTH, true_poses
 
 import studio
-from studio import extending
+from studio import arena, extending
 from studio.body.catalogue import load_body
 from studio.body.subject import Subject
 from studio.operations import person
@@ -34,7 +34,7 @@ def test_importing_studio_imports_no_room_until_a_verb_is_requested() -> None:
     assert found.stdout.strip() == "[] True False"
 
 
-@pytest.mark.parametrize("public", [studio, extending])
+@pytest.mark.parametrize("public", [studio, extending, arena])
 def test_what_editors_know_is_what_is_there(public: ModuleType) -> None:
     stub = ast.parse(Path(str(public.__file__)).with_suffix(".pyi").read_text(encoding="utf-8"))
     named = {entry.name: node.module for node in stub.body for entry in node.names}  # pyright: ignore[reportAttributeAccessIssue]

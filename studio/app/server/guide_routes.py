@@ -12,11 +12,12 @@ from markdown_it import MarkdownIt
 from starlette.responses import HTMLResponse
 
 import studio
+from studio import ARENA, arena
 from studio.app.server.answers import Router
 from studio.app.server.interfaces_page import INTERFACES, interfaces_page, text_of
 from studio.app.server.pages import NAME, html_page
 from studio.evidence.settings import EvidenceSettings
-from studio.foundations.declaring import REQUIRED, Knobs, Operation, Parameter, declared
+from studio.foundations.declaring import DECLARED, REQUIRED, Knobs, Operation, Parameter, declared
 from studio.foundations.errors import NotFoundError
 from studio.foundations.knobs import Knob, Value, allowed, knobs_of
 from studio.foundations.package import assets_folder
@@ -161,7 +162,9 @@ def _course_link(page: str, shown: str) -> str:
 @cache
 def verbs_page() -> dict[str, str]:
     """The page on what each verb does and takes, in Python, on the command line and over HTTP."""
-    verbs = {name: getattr(studio, name) for name in dir(studio) if name != "StudioError"}
+    verbs = {name: getattr(studio, name) for name in dir(studio) if name not in ("StudioError", ARENA)}
+    own = [name for name in dir(arena) if hasattr(getattr(arena, name), DECLARED)]
+    verbs |= {f"{ARENA}.{name}": getattr(arena, name) for name in own}
     contents = ['<a href="/guide">Guide</a>', '<a href="/guide/python">Examples</a>']
     contents += [f'<a href="#{name}">{name}</a>' for name in verbs]
     parts = [_verb(name, declared(function)) for name, function in verbs.items()]
