@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from studio.foundations.declaring import Terminal, Web, operation
+from studio.foundations.declaring import Terminal, Web, operation, taking
 from studio.foundations.errors import RunError
 from studio.foundations.progress import Progress
 from studio.operations.jobs.trials import TrialResult, run_jobs
@@ -20,7 +20,7 @@ from studio.results.arena.problem import ArenaError, Definition, Problem
 from studio.results.arena.problem_files import write_problems
 from studio.results.arena.profiles import Trial
 from studio.results.arena.race_files import RaceDocument, race_document, write_race
-from studio.results.arena.racers import RACERS, Racer, racer_named
+from studio.results.arena.racers import RACERS, SUFFIX, Racer, racer_named
 from studio.results.arena.racing import as_trial, chosen, defined_in, measure_race, planned
 from studio.results.comparison import trials as kinds
 from studio.results.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by, plain
@@ -46,7 +46,7 @@ Reference = Annotated[
 Limbs = Annotated[
     Sequence[str],
     Field(
-        description="A limb or a parameter that is searched, the rest held as the run has it; default: all"
+        description="A limb or a parameter that is searched, the rest held as the run has it (default: all)"
     ),
     Terminal("--limb", metavar="NAME"),
 ]
@@ -150,26 +150,31 @@ class Raced:
     kept: int
 
 
-@operation
-def race(
+@dataclass(frozen=True, slots=True)
+class RaceRequest:
+    """What is raced."""
+
     problems: Annotated[
         Sequence[str],
-        Field(description="A problem by name, or all that are easy or hard; default: all"),
+        Field(description="A problem by name, or all that are easy or hard (default: all)"),
         Terminal("--problem", metavar="NAME"),
-        Web(left_out=True),
-    ] = (),
+    ] = ()
     racers: Annotated[
         Sequence[str],
-        Field(description="A racer by name, or a Python file with one; default: all that are installed"),
+        Field(description="A racer by name, or a Python file with one (default: all that are installed)"),
         Terminal("--racer", metavar="NAME"),
-        Web(left_out=True),
-    ] = (),
-    *,
+    ] = ()
     evaluations: Annotated[
         int, Field(ge=10, le=100_000_000, description="Poses that each racer may weigh of a problem.")
-    ] = 10_000,
-    seeds: Annotated[int, Field(ge=1, le=1000, description="Number of seeds of each racer, from 0 on.")] = 5,
-    file: ProblemFile = "",
+    ] = 10_000
+    seeds: Annotated[int, Field(ge=1, le=1000, description="Number of seeds of each racer, from 0 on.")] = 5
+    file: ProblemFile = ""
+
+
+@operation
+@taking(RaceRequest)
+def race(
+    *,
     out: Annotated[
         str | Path | None,
         Field(description="Folder of what is kept; default: 'arena' in the workspace."),
@@ -179,6 +184,7 @@ def race(
         int | None, Field(ge=1, description="Trials at once; default: one a core."), Web(left_out=True)
     ] = None,
     progress: Reporting = None,
+    **options: Any,  # noqa: ANN401 - of the types that are declared
 ) -> Raced:
     """Race optimisers on problems: how many evaluations each needs to come how near the heaviest known pose.
 
@@ -188,10 +194,13 @@ def race(
     Raises ArenaError for an unknown problem, and for a racer that raises, weighs nothing or gives a pose that is not
     finite; UnknownMemberError for an unknown racer; RunError while another process races in the folder.
     """
-    place = str(Path(file).absolute()) if file else ""
-    definitions = chosen(defined_in(place), problems)
-    named = tuple(str(Path(one).absolute()) if one.endswith(".py") else one for one in racers or RACERS)
-    wanted = planned(definitions, named, evaluations, range(seeds), place)
+    request = RaceRequest(**options)
+    place = str(Path(request.file).absolute()) if request.file else ""
+    definitions = chosen(defined_in(place), request.problems)
+    named = tuple(
+        str(Path(one).absolute()) if one.endswith(SUFFIX) else one for one in request.racers or RACERS
+    )
+    wanted = planned(definitions, named, request.evaluations, range(request.seeds), place)
     folder = Path(out).absolute() if out else workspace_root().absolute() / ARENA
     with writing("The race", folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -202,7 +211,7 @@ def race(
         with reporting(progress, "racing") as report:
             outcomes, kept = _outcomes(wanted, KeptTrials(folder / TRIALS), report, processes)
         labels = {racer_named(name).name: racer_named(name).label for name in named}
-        document = race_document(definitions, outcomes, labels, evaluations)
+        document = race_document(definitions, outcomes, labels, request.evaluations)
         write_race(folder, document)
     finally:
         lock.free()

@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 from starlette.responses import HTMLResponse
 
 import studio
-from studio import ARENA, arena
+from studio import arena
 from studio.app.server.answers import Router
 from studio.app.server.interfaces_page import INTERFACES, interfaces_page, text_of
 from studio.app.server.pages import NAME, html_page
@@ -162,9 +162,9 @@ def _course_link(page: str, shown: str) -> str:
 @cache
 def verbs_page() -> dict[str, str]:
     """The page on what each verb does and takes, in Python, on the command line and over HTTP."""
-    verbs = {name: getattr(studio, name) for name in dir(studio) if name not in ("StudioError", ARENA)}
+    verbs = {name: getattr(studio, name) for name in dir(studio) if name not in ("StudioError", "arena")}
     own = [name for name in dir(arena) if hasattr(getattr(arena, name), DECLARED)]
-    verbs |= {f"{ARENA}.{name}": getattr(arena, name) for name in own}
+    verbs |= {f"arena.{name}": getattr(arena, name) for name in own}
     contents = ['<a href="/guide">Guide</a>', '<a href="/guide/python">Examples</a>']
     contents += [f'<a href="#{name}">{name}</a>' for name in verbs]
     parts = [_verb(name, declared(function)) for name, function in verbs.items()]

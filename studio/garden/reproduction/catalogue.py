@@ -25,6 +25,7 @@ from studio.garden.reproduction.deutscher_reid import (
 )
 from studio.garden.reproduction.experiment import TABLE, Experiment
 from studio.garden.reproduction.open_questions import (
+    arena,
     defaults,
     effort,
     error_split,
@@ -65,6 +66,7 @@ MODULES = (
     shadow_masks,
     evaluations,
     effort,
+    arena,
     posterior,
     sampled_posterior,
     tempered_people,

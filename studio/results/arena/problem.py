@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, Parameter
 from studio.body.reader import parse_body
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array, Bytes, Indices
@@ -239,13 +239,17 @@ class Problem:
     @cached_property
     def parameters(self) -> tuple[str, ...]:
         """(D,) names."""
-        return tuple(self.body.parameters[number].name for number in self.definition.free)
+        return tuple(entry.name for entry in self._entries)
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """(D,) "mm" or "rad"."""
-        kinds = (self.body.parameters[number].kind for number in self.definition.free)
-        return tuple("mm" if kind == "length" else "rad" for kind in kinds)
+        return tuple("mm" if entry.kind == "length" else "rad" for entry in self._entries)
+
+    @property
+    def _entries(self) -> list[Parameter]:
+        numbers: list[int] = self.definition.free.tolist()
+        return [self.body.parameters[number] for number in numbers]
 
     @property
     def lower(self) -> Array:
@@ -352,10 +356,10 @@ class Problem:
 
     def _checked(self, poses: ArrayLike) -> Array:
         try:
-            given = np.asarray(poses, dtype=np.float64)
+            given: Array = np.asarray(poses, dtype=np.float64)
         except (TypeError, ValueError):
-            given = np.zeros(0)
-        if given.ndim != 2 or given.shape[1] != self.dimensions:
+            given = np.array([])
+        if given.ndim != 2 or given.shape[-1] != self.dimensions:
             raise ArenaError(
                 f"Problem '{self.name}' was given an array of shape {given.shape}.",
                 f"Give poses (N, {self.dimensions}), one a row.",

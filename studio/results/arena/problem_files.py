@@ -46,6 +46,7 @@ class _Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: str
     width: int
     height: int
+    quarter_turns: int = 0
 
 
 class _Frame(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -147,7 +148,7 @@ def read_problems(path: Path) -> tuple[Definition, ...]:
 
 
 def _frame(maps: FrameMaps) -> _Frame:
-    cameras = tuple(_Camera(one.name, one.width, one.height) for one in maps.cameras)
+    cameras = tuple(_Camera(one.name, one.width, one.height, one.quarter_turns) for one in maps.cameras)
     return _Frame(maps.number, maps.body_name, maps.body, cameras, maps.weighting, dict(maps.knobs))
 
 
@@ -185,12 +186,18 @@ def _maps(name: str, one: _Frame, arrays: Arrays) -> FrameMaps:
         raise ValueError(f"a frame of {len(one.cameras)} cameras")
     cameras, views = list[Camera](), list[ViewMaps]()
     for at, entry in enumerate(one.cameras):
-        parts = {part: _numbers(arrays, f"{name}.{at}.{part}", shape) for part, shape in CAMERA_PARTS.items()}
-        cameras.append(Camera(entry.name, entry.width, entry.height, **parts))
+        numbers = [_numbers(arrays, f"{name}.{at}.{part}", shape) for part, shape in CAMERA_PARTS.items()]
+        matrix, distortion, rotation, translation = numbers
+        size = entry.width, entry.height
+        cameras.append(
+            Camera(entry.name, *size, matrix, distortion, rotation, translation, entry.quarter_turns)
+        )
         pictures = {part: arrays.get(f"{name}.{at}.{part}") for part in ("mask", "edges", "hidden")}
         for part, picture in pictures.items():
+            if picture is None and part == "hidden":
+                continue
             fits = picture is not None and picture.shape == (entry.height, entry.width)
-            if not (fits and picture.dtype == np.uint8) and (picture is not None or part != "hidden"):
+            if picture is None or not fits or picture.dtype != np.uint8:
                 raise ValueError(f"{part} of camera '{entry.name}' is not {entry.width} × {entry.height}")
         views.append(ViewMaps(arrays[f"{name}.{at}.mask"], arrays[f"{name}.{at}.edges"], pictures["hidden"]))
     return FrameMaps(

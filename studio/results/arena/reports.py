@@ -1,6 +1,6 @@
 """Races as charts and tables: ECDF, expected running times, who came how near."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -47,28 +47,26 @@ def _series(profile: Profile) -> Series:
 
 
 def tables_of(trials: Sequence[Trial], definitions: Sequence[Definition]) -> Iterator[Table]:
-    """The problems; expected running times; how near each racer came."""
+    """The problems; expected running times; how near each racer came. Each a row a problem, then a column a racer."""
     yield problem_table(definitions)
     groups = by_problem_and_racer(trials)
-    heads = tuple(f"{100 * share:g} % of the way left" for share in TIMES_AT)
-    rows = tuple(
-        (problem, racer, *(time_in_words(running_time(own, share)) for share in TIMES_AT))
-        for (problem, racer), own in groups.items()
-    )
-    yield Table("Expected evaluations [95 % band] (reached / seeds)", ("problem", "racer", *heads), rows)
     names = tuple(dict.fromkeys(racer for _, racer in groups))
-    yield Table(
-        "Way from the start pose to the heaviest known one that is left in the end (%, median over seeds)",
-        ("problem", *names),
-        tuple(
-            (one.name, *(_left(groups.get((one.name, name), [])) for name in names)) for one in definitions
-        ),
-    )
+
+    def table(title: str, cell: Callable[[Sequence[Trial]], Plain]) -> Table:
+        rows = ((one.name, *(cell(groups[one.name, name]) for name in names)) for one in definitions)
+        return Table(title, ("problem", *names), tuple(rows))
+
+    for share in TIMES_AT:
+        yield table(
+            f"Expected evaluations until {100 * share:g} % of the way are left [95 % over seeds]",
+            lambda own, share=share: time_in_words(running_time(own, share)),
+        )
+    yield table("Way that is left in the end (%, median over seeds)", _left)
 
 
 def _left(trials: Sequence[Trial]) -> Plain:
-    left = [trial.share_left for trial in trials]
-    return float(f"{100.0 * float(np.median(left)):.3g}") if left else ""
+    """Of the way from the start pose to the heaviest known one."""
+    return float(f"{100.0 * float(np.median([trial.share_left for trial in trials])):.3g}")
 
 
 def problem_table(definitions: Sequence[Definition]) -> Table:
@@ -94,11 +92,12 @@ def problem_table(definitions: Sequence[Definition]) -> Table:
 
 
 def time_in_words(time: RunningTime) -> str:
-    """ "1200 [900, 1700] (10 / 10)"; "–" where it was never reached."""
+    """ "1200 [900, 1700]"; "1200 [900, ∞] (8 of 10)" where not all seeds came so near, "–" where none did."""
     if not time.reached:
-        return f"– ({time.reached} / {time.trials})"
+        return "–"
     ends = ", ".join(f"{end:.0f}" if np.isfinite(end) else "∞" for end in (time.low, time.high))
-    return f"{time.expected:.0f} [{ends}] ({time.reached} / {time.trials})"
+    some = f" ({time.reached} of {time.trials})" if time.reached < time.trials else ""
+    return f"{time.expected:.0f} [{ends}]{some}"
 
 
 def words_of(trials: Sequence[Trial], budget: int) -> str:
