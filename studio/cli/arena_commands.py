@@ -1,10 +1,12 @@
 """`studio arena`: problems listed and exported, optimisers raced."""
 
+from dataclasses import asdict
+
 import click
 
 from studio.cli.deriving import Call, command_of
 from studio.foundations.words import counted
-from studio.operations.arena import Exported, Raced, export, problems, race, racers
+from studio.operations.arena import Exported, Raced, export, problem_line, problems, race, racers
 from studio.results.arena.problem import Problem
 
 
@@ -16,31 +18,14 @@ def arena_command() -> None:
 @command_of(problems, name="list")
 def list_command(call: Call) -> dict[str, object]:
     listed: tuple[Problem, ...] = call()
-    entries = [_entry(one) for one in listed]
-    lines = [
-        f"{one['name']:28} {one['kind']:5} {one['dimensions']:>3} parameters  {one['weighting']:22} {one['about']}"
-        for one in entries
+    lines = [problem_line(one) for one in listed]
+    words = [
+        f"{one.name:28} {one.kind:5} {one.dimensions:>3} parameters  {one.weighting:22} {one.about}"
+        for one in lines
     ]
     members = [{"name": one.name, "label": one.label} for one in racers()]
-    lines.append(f"Racers: {', '.join(one['name'] for one in members)}; or a Python file of your own.")
-    return {"problems": entries, "racers": members, "text": "\n".join(lines)}
-
-
-def _entry(problem: Problem) -> dict[str, object]:
-    best = problem.best
-    return {
-        "name": problem.name,
-        "kind": problem.kind,
-        "about": problem.about,
-        "dimensions": problem.dimensions,
-        "parameters": list(problem.parameters),
-        "weighting": problem.weighting,
-        "microseconds": problem.microseconds,
-        "hash": problem.hash,
-        "best_log_weight": None if best is None else best.log_weight,
-        "best_evaluations": None if best is None else best.evaluations,
-        "best_hash": None if best is None else best.hash,
-    }
+    words.append(f"Racers: {', '.join(one['name'] for one in members)}; or a Python file of your own.")
+    return {"problems": [asdict(one) for one in lines], "racers": members, "text": "\n".join(words)}
 
 
 @command_of(export)

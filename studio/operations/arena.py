@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 from pydantic import Field
 
 from studio.foundations.declaring import Terminal, Web, operation, taking
-from studio.foundations.errors import RunError
+from studio.foundations.errors import NotFoundError, RunError, SessionError
+from studio.foundations.foreign_files import read_file
 from studio.foundations.progress import Progress
+from studio.foundations.typed_decoding import decode_json
 from studio.operations.jobs.trials import TrialResult, run_jobs
 from studio.operations.opening import RunName, keeping_in_place, open_run, session_of
 from studio.operations.progress import Reporting, reporting
@@ -19,7 +22,7 @@ from studio.results.arena.making import REFERENCE, problems_of_run
 from studio.results.arena.problem import ArenaError, Definition, Problem
 from studio.results.arena.problem_files import write_problems
 from studio.results.arena.profiles import Trial
-from studio.results.arena.race_files import RaceDocument, race_document, write_race
+from studio.results.arena.race_files import DOCUMENT, PAGE, RaceDocument, race_document, write_race
 from studio.results.arena.racers import RACERS, SUFFIX, Racer, racer_named
 from studio.results.arena.racing import as_trial, chosen, defined_in, measure_race, planned
 from studio.results.comparison import trials as kinds
@@ -29,12 +32,14 @@ from studio.results.inspection.reading import InspectedRun
 from studio.sessions.atomic_files import writing
 from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock
-from studio.sessions.workspace import workspace_root
+from studio.sessions.workspace import Workspace
 
 ARENA, TRIALS, LOCK = "arena", "trials", "arena.lock"
 """Folder of races in the workspace, and what is in it."""
 KEY_LENGTH = 24
 
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+"""From far away a racer is named and never a file, which would be run."""
 ProblemFile = Annotated[
     str | Path,
     Field(description="A set of problems that was exported; default: the bundled one."),
@@ -65,6 +70,49 @@ def problems(file: ProblemFile = "") -> tuple[Problem, ...]:
     Raises ArenaError for a file that is missing or damaged.
     """
     return tuple(map(Problem, defined_in(str(file or ""))))
+
+
+@dataclass(frozen=True, slots=True)
+class ProblemLine:
+    """A problem in a list.
+
+    kind : "easy" or "hard".
+    about : where its frame is from.
+    weighting : the likelihood.
+    microseconds : of an evaluation on the machine that made it.
+    hash : of its function, bounds and prior.
+    best_log_weight, best_evaluations, best_hash : of the heaviest known pose.
+    """
+
+    name: str
+    kind: str
+    about: str
+    dimensions: int
+    parameters: tuple[str, ...]
+    weighting: str
+    microseconds: float
+    hash: str
+    best_log_weight: float | None
+    best_evaluations: int | None
+    best_hash: str | None
+
+
+def problem_line(problem: Problem) -> ProblemLine:
+    """What a list says of a problem."""
+    best = problem.best
+    return ProblemLine(
+        problem.name,
+        problem.kind,
+        problem.about,
+        problem.dimensions,
+        problem.parameters,
+        problem.weighting,
+        problem.microseconds,
+        problem.hash,
+        None if best is None else best.log_weight,
+        None if best is None else best.evaluations,
+        None if best is None else best.hash,
+    )
 
 
 @operation
@@ -158,11 +206,13 @@ class RaceRequest:
         Sequence[str],
         Field(description="A problem by name, or all that are easy or hard (default: all)"),
         Terminal("--problem", metavar="NAME"),
+        Web(kind=list[Name]),
     ] = ()
     racers: Annotated[
         Sequence[str],
         Field(description="A racer by name, or a Python file with one (default: all that are installed)"),
         Terminal("--racer", metavar="NAME"),
+        Web(kind=list[Name]),
     ] = ()
     evaluations: Annotated[
         int, Field(ge=10, le=100_000_000, description="Poses that each racer may weigh of a problem.")
@@ -201,7 +251,7 @@ def race(
         str(Path(one).absolute()) if one.endswith(SUFFIX) else one for one in request.racers or RACERS
     )
     wanted = planned(definitions, named, request.evaluations, range(request.seeds), place)
-    folder = Path(out).absolute() if out else workspace_root().absolute() / ARENA
+    folder = Path(out).absolute() if out else Workspace().root / ARENA
     with writing("The race", folder):
         folder.mkdir(parents=True, exist_ok=True)
     lock = ProcessLock.take(folder / LOCK)
@@ -216,6 +266,34 @@ def race(
     finally:
         lock.free()
     return Raced(tuple(map(as_trial, outcomes)), document, folder, len(wanted) - kept, kept)
+
+
+class KeptRace(msgspec.Struct, frozen=True):
+    """A race as `race.json` has it. findings : its charts and tables. drawn : who is where, a picture a problem."""
+
+    findings: dict[str, Any]
+    drawn: list[dict[str, Any]]
+
+
+def kept_race(workspace: Workspace) -> KeptRace | None:
+    """The last race in the workspace, None where there was none. Raises SessionError where it cannot be read."""
+    path = workspace.root / ARENA / DOCUMENT
+    if not path.is_file():
+        return None
+    try:
+        return decode_json(read_file(path), KeptRace)
+    except (msgspec.DecodeError, OSError) as error:
+        raise SessionError(
+            f"'{path}' cannot be read: {error}.", "Race again; what is measured is kept."
+        ) from None
+
+
+def race_page(workspace: Workspace) -> Path:
+    """The page of the last race in the workspace. Raises NotFoundError."""
+    path = workspace.root / ARENA / PAGE
+    if not path.is_file():
+        raise NotFoundError("There was no race yet.", "Begin one: studio arena race.")
+    return path
 
 
 def _outcomes(

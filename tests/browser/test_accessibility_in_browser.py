@@ -35,6 +35,7 @@ PAGES = {
     "/bodies?session=walk&body=mouse": ".parts",
     "/gallery": ".gallery-card",
     "/reports": "#findings .lead",
+    "/arena": "#findings .lead",
     "/guide": "main",
     "/guide/verbs": "main",
 }

@@ -75,16 +75,13 @@ export function drawRace(place, problems) {
 }
 
 const lines = (segments, attributes) =>
-  shape(
-    "path",
-    {
-      fill: "none",
-      "stroke-linecap": "round",
-      "vector-effect": "non-scaling-stroke",
-      d: segments.map(([x, y, toX, toY]) => `M${x} ${y}L${toX} ${toY}`).join(""),
-      ...attributes,
-    },
-  );
+  shape("path", {
+    fill: "none",
+    "stroke-linecap": "round",
+    "vector-effect": "non-scaling-stroke",
+    d: segments.map(([x, y, toX, toY]) => `M${x} ${y}L${toX} ${toY}`).join(""),
+    ...attributes,
+  });
 
 function picture(problem, count, colours, hidden) {
   const racers = Object.entries(problem.racers).filter(([name]) => !hidden.has(name));
@@ -150,7 +147,11 @@ function standing(problem, count, colours, hidden, turn) {
           },
           mark,
           name,
-          element("span", {}, left === null ? "nothing yet" : `${(100 * left).toFixed(left < 0.1 ? 1 : 0)} % left`),
+          element(
+            "span",
+            {},
+            left === null ? "nothing yet" : `${(100 * left).toFixed(left < 0.1 ? 1 : 0)} % left`,
+          ),
         ),
       );
     }),

@@ -17,6 +17,7 @@ from starlette.staticfiles import StaticFiles
 from studio.app.scene.window_scenes import WindowScenes
 from studio.app.server import (
     alignment_routes,
+    arena_routes,
     background_routes,
     behaviour_learning_routes,
     behaviour_routes,
@@ -118,6 +119,7 @@ ROUTERS = (
     behaviour_routes.router,
     behaviour_learning_routes.router,
     report_routes.router,
+    arena_routes.router,
     scene_routes.router,
     scene_picture_routes.router,
     scene_relay.router,
@@ -142,6 +144,7 @@ JOBS: tuple[JobKind[Any], ...] = (
     COMPARISON,
     LEARNING,
     report_routes.REPRODUCTION,
+    arena_routes.RACE,
 )
 """Work of which pages hear events."""
 ERRORS = (400, 403, 404, 409, 422, 500)

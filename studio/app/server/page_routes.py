@@ -15,7 +15,7 @@ DOCUMENT = "document.html"
 """One frame with a bar of places; what is in it is drawn by each page's own module."""
 RAILED = ("comparisons", "bodies", "behaviours")
 """Pages that have a list at the left, and a button that makes something."""
-UNRAILED = ("gallery", "recording", "reports")
+UNRAILED = ("gallery", "recording", "reports", "arena")
 RAIL = (
     '<nav class="rail" aria-label="{title}">\n    <div class="rail-head">\n      <h2>{title}</h2>\n      '
     '<button class="quiet small" id="new">+ New</button>\n    </div>'

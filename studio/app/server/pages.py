@@ -20,6 +20,7 @@ PLACES = {
     "/bodies": "Bodies",
     "/behaviours": "Behaviours",
     "/reports": "Reports",
+    "/arena": "Arena",
     "/guide": "Guide",
 }
 

@@ -61,6 +61,7 @@ def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
         ("/comparisons", "Comparisons · Capture studio"),
         ("/behaviours", "Behaviours · Capture studio"),
         ("/reports", "Reports · Capture studio"),
+        ("/arena", "Arena · Capture studio"),
         ("/guide", "Guide · Capture studio"),
     ],
 )

@@ -142,6 +142,7 @@ def test_sessions_runs_results_and_events_can_be_seen(
         "/comparisons",
         "/behaviours",
         "/reports",
+        "/arena",
         "/scene/w/",
         "/api/sessions",
         run,
