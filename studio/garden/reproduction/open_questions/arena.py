@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from studio.garden.reproduction.experiment import Part, listed
+from studio.results.arena.problem import Definition
 from studio.results.arena.profiles import SHARES, Trial
 from studio.results.arena.racers import RACERS
 from studio.results.arena.racing import as_trial, defined_in, measure_race, planned
@@ -24,8 +25,12 @@ def trials(scale: Scale) -> tuple[kinds.Trial, ...]:
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """Targets reached by each racer, with its intervals over seeds; the profiles; expected running times."""
-    raced, definitions = [as_trial(outcome) for outcome in outcomes], defined_in("")
     budget = int(outcomes[0].trial.arguments["evaluations"])
+    yield from shown_of([as_trial(outcome) for outcome in outcomes], defined_in(""), budget)
+
+
+def shown_of(raced: Sequence[Trial], definitions: Sequence[Definition], budget: int) -> Iterator[Part]:
+    """The same of races on some problems."""
     for name in dict.fromkeys(one.racer for one in raced):
         yield number(f"targets reached within {budget} evaluations, {name}", _reached(raced, name), "%")
     yield from charts_of(raced, definitions, budget)
