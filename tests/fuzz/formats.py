@@ -28,6 +28,8 @@ from studio.footage.capture.stream_files import mend_recording
 from studio.footage.capture.timestamps import offsets_from_times, read_timestamps
 from studio.footage.capture.video import VideoReader, measure_video, probe_video
 from studio.foundations.errors import StudioError
+from studio.results.arena.problem import Problem
+from studio.results.arena.problem_files import read_problems
 from studio.results.verifying import verify
 from studio.runs.new_run import prepare_run
 from studio.runs.setup.session_settings import session_settings
@@ -171,6 +173,11 @@ def _read_project(folder: Path) -> None:
     carried_truth(plan, read, 60.0, 3, "")
 
 
+def _read_problems(path: Path) -> None:
+    for problem in map(Problem, read_problems(path)):
+        problem.log_likelihood(problem.prior.start[None])
+
+
 def _unpack(path: Path) -> None:
     with tempfile.TemporaryDirectory(dir=path.parent.parent) as into:
         unpack(path, Path(into))
@@ -216,6 +223,7 @@ FORMATS: Mapping[str, Format] = {
     "tiff": Format(PICTURE),
     "video": Format((_each(_read_video), _each(mend_recording))),
     "behaviour": Format((_each(read_model),)),
+    "arena": Format((_each(_read_problems),)),
     "zip": Format((_each(_unpack),)),
     "tar": Format((_each(_unpack),)),
     "tar-gz": Format((_each(_unpack),)),

@@ -81,7 +81,7 @@ function drawRunner() {
     card(
       "Race optimisers on frames",
       hint(
-        "A frame's likelihood as a black box: every racer begins where the frame before ended and may weigh as many poses. Nothing needs footage. What is not ticked takes part unless something is.",
+        "A frame's likelihood as a black box: every racer begins where the frame before ended and may weigh as many poses. No footage is needed. With nothing ticked all take part.",
       ),
       element(
         "div",
@@ -107,7 +107,7 @@ function drawRunner() {
         ),
         element(
           "div",
-          {},
+          { className: "race-numbers" },
           field(
             "Evaluations a problem",
             number(evaluations, {
