@@ -42,6 +42,7 @@ CLIPS = (
     ArenaClip("planar-arm", "planar_arm", 20),
     ArenaClip("branched-arms", "branched_arms", 20),
     ArenaClip("walk", "walk", 30, (("left arm",), ("right leg",))),
+    ArenaClip("walk-20hz", "choosing-walk-20hz", 12),
     ArenaClip("turns", "choosing-turns", 24),
     ArenaClip("kick", "choosing-kick", 45, (("left leg", "right leg"),)),
     ArenaClip("cartwheel", "choosing-cartwheel", 40),

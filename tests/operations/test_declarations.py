@@ -8,6 +8,7 @@ import pytest
 from fastapi import FastAPI
 
 import studio
+from studio import arena
 from studio.app.server import app, guide_routes
 from studio.app.server.requests import MADE
 from studio.cli.main import load
@@ -19,6 +20,7 @@ NAMED = {
     "export_run": "export",
     "new_session": "new",
     "mask_quality": "background",
+    "problems": "list",
 }
 OF_ANOTHER = {
     "unalign": "align",
@@ -27,8 +29,9 @@ OF_ANOTHER = {
     "go_on": "track",
     "resume_live": "live",
     "replay": "live",
+    "problems_of": "export",
 }
-"""Verbs that are options of another one's command: --undo, --quality, --resume, --replay."""
+"""Verbs that are options of another one's command: --undo, --quality, --resume, --replay; or that it does first."""
 OWN_WORDS = {
     "track": {"first", "last"},
     "batch": {"first", "last"},
@@ -38,11 +41,13 @@ OWN_WORDS = {
     "view": {"layer"},
 }
 """Parameters that the terminal writes in another way: --frames A:B, --exclude CAMERA=…, layers counted from 1."""
-VERBS = {
-    name: declared(getattr(studio, name))
-    for name in dir(studio)
-    if hasattr(getattr(studio, name), "__operation__")
+FUNCTIONS = {
+    name: getattr(public, name)
+    for public in (studio, arena)
+    for name in dir(public)
+    if hasattr(getattr(public, name), "__operation__")
 }
+VERBS = {name: declared(function) for name, function in FUNCTIONS.items()}
 
 
 LEFT_WHERE_IT_IS = {
@@ -59,12 +64,17 @@ def test_a_session_stays_where_it_is_while_a_verb_works_on_it() -> None:
         for name, one in VERBS.items()
         if any(map(_is_target, inspect.signature(one.function).parameters.values()))
     }
-    keeping = {name for name in about if getattr(getattr(studio, name), "keeps_in_place", False)}
+    keeping = {name for name in about if getattr(FUNCTIONS[name], "keeps_in_place", False)}
     assert about - keeping == set(LEFT_WHERE_IT_IS)
 
 
 def command_of(verb: str) -> click.Command:
-    return load(NAMED.get(verb, verb.replace("_", "-")))
+    name = NAMED.get(verb, verb.replace("_", "-"))
+    if verb not in dir(arena):
+        return load(name)
+    group = load("arena")
+    assert isinstance(group, click.Group)
+    return group.commands[name]
 
 
 @pytest.fixture(scope="module")
@@ -164,6 +174,7 @@ def test_the_signature_that_an_editor_shows_is_the_declaration() -> None:
 def test_the_guide_lists_every_verb_with_its_entries() -> None:
     page = guide_routes.verbs_page()["content"]
     for name, verb in VERBS.items():
-        assert f'id="{name}"' in page
+        place = f"arena.{name}" if name in dir(arena) else name
+        assert f'id="{place}"' in page
         for entry in verb.parameters:
             assert f"<code>{entry}</code>" in page, f"{name}: {entry}"

@@ -38,7 +38,6 @@ from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.run_behaviour import RunBehaviour
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import RunSettings
-from studio.search.trackers.frame_refinement import space_after
 from studio.search.trackers.tracker import FilterState
 
 REFERENCE, CLIMB = 1_000_000, 40_000
@@ -66,7 +65,7 @@ class FrameStart:
 
 
 def frame_start(run: InspectedRun, number: int) -> FrameStart:
-    """A frame of a run as its search began it.
+    """A frame of a run as its search began it, with the whole σ0, of which a run that refines its frames takes a share.
 
     Raises NotFoundError for a frame that is not finished, RunError for one that began without a pose, ArenaError where
     the likelihood reads the pictures themselves.
@@ -82,12 +81,11 @@ def frame_start(run: InspectedRun, number: int) -> FrameStart:
         history = FrameHistory(results, run.run.record, [one for one in results.frames() if one < number])
         carried = behaviour.carried_into(number, history.into(number))
         space = space_over(behaviour.space_in(number), history.steps_to(number))
-    sigma = space_after(space, carried, settings.refinement).sigma
     reported, truth = frame.result.estimate.pose, true_pose(run, number)
     known = (reported, frame.searched(), *(() if truth is None else (truth.pose,)))
     return FrameStart(
         _maps(run, number, settings),
-        _prior(run, number, carried, sigma),
+        _prior(run, number, carried, space.sigma),
         reported,
         tuple(np.clip(pose, run.body.lower, run.body.upper) for pose in known),
         f"frame {number} of {run.session.name} / {run.run.name}",
@@ -217,9 +215,10 @@ def _microseconds(problem: Problem) -> float:
     prior = problem.prior
     poses = rng.normal(prior.start, prior.sigma, (TIMED, problem.dimensions))
     poses = np.clip(poses, problem.lower, problem.upper)
-    began = time.perf_counter()
     problem.weigh(poses)
-    return round(1e6 * (time.perf_counter() - began) / TIMED, 2)
+    began = time.process_time()
+    problem.weigh(poses)
+    return round(1e6 * (time.process_time() - began) / TIMED, 2)
 
 
 def problems_of_run(

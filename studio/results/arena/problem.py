@@ -154,7 +154,7 @@ class Definition:
     free : (D,) numbers of the body's parameters that are searched.
     held : the body's pose, whose other parameters stay.
     lower, upper : (D,) bounds.
-    microseconds : of an evaluation in large batches, on the machine that made the problem.
+    microseconds : processor time of an evaluation in large batches, on the machine that made the problem.
     """
 
     name: str
@@ -273,7 +273,7 @@ class Problem:
 
     @property
     def microseconds(self) -> float:
-        """What an evaluation cost in large batches on the machine that made the problem; 0 where that is not known."""
+        """Processor time of an evaluation in large batches, on the machine that made the problem."""
         return self.definition.microseconds
 
     @property

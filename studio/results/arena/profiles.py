@@ -123,8 +123,8 @@ def running_time(trials: Sequence[Trial], share: float) -> RunningTime:
 
 def profiles(trials: Sequence[Trial], budget: int, points: int = 60) -> list[Profile]:
     """The ECDF of every racer, in the order of the trials, from one evaluation to the budget."""
-    spaced: Array = np.logspace(0.0, np.log10(max(budget, 2)), points)
-    counts = np.array(sorted(set(spaced.round().tolist())))
+    spaced = [round(budget ** (place / (points - 1))) for place in range(points)]
+    counts = np.array(sorted(set(spaced)), np.float64)
     return [profile(name, own, counts) for name, own in _grouped(trials, lambda trial: trial.racer).items()]
 
 

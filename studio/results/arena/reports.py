@@ -74,7 +74,7 @@ def problem_table(definitions: Sequence[Definition]) -> Table:
     rows: list[tuple[Plain, ...]] = []
     for one in definitions:
         best = one.best
-        known = ("", "") if best is None else (round(best.log_weight, 4), best.evaluations)
+        known = ("", "") if best is None else (float(f"{best.log_weight:.4g}"), best.evaluations)
         rows.append(
             (one.name, one.kind, len(one.free), one.about, one.maps.weighting, *known, one.microseconds)
         )
