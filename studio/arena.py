@@ -8,7 +8,7 @@ import importlib
 
 _NAMES = {
     "studio.operations.arena": ("export", "problems", "problems_of", "race", "racers"),
-    "studio.results.arena.problem": ("ArenaError", "BudgetSpentError", "Problem"),
+    "studio.results.arena.problem": ("ArenaError", "BudgetSpentError", "KnownBest", "Prior", "Problem"),
     "studio.results.arena.racers": ("Racer",),
 }
 _MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}

@@ -7,5 +7,7 @@ from studio.operations.arena import race as race
 from studio.operations.arena import racers as racers
 from studio.results.arena.problem import ArenaError as ArenaError
 from studio.results.arena.problem import BudgetSpentError as BudgetSpentError
+from studio.results.arena.problem import KnownBest as KnownBest
+from studio.results.arena.problem import Prior as Prior
 from studio.results.arena.problem import Problem as Problem
 from studio.results.arena.racers import Racer as Racer

@@ -39,8 +39,8 @@ PLACE_OF_PRINTED = "{{printed}}"
 # Of `studio reproduce --into-guide`, and what it is compared with.
 REPRODUCTION, BEFORE = "reproduction", "before.json"
 VERBS_WORDS = (
-    "What a person lets the studio do: each is a function of <code>studio</code> or <code>studio.arena</code>, most are a"
-    " command, and the page asks for them over HTTP. A keyword, an option and an entry of a body are one declaration."
+    "What a person lets the studio do: each is a function of <code>studio</code> or <code>studio.arena</code>, most are"
+    " a command, and the page asks for them over HTTP. A keyword, an option and an entry of a body are one declaration."
 )
 VERB_COLUMNS = ("Keyword", "What it means", "Default", "Option", "HTTP")
 TEXTS = {

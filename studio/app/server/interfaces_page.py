@@ -1,19 +1,20 @@
-"""`/guide/interfaces`: what `studio.extending` gives, from the docstrings."""
+"""`/guide/interfaces`: what `studio.extending` gives, and what a racer of the arena meets, from the docstrings."""
 
 import html
 import inspect
 import re
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
-from studio import extending
+from studio import arena, extending
 from studio.app.server.pages import NAME
 
 INTERFACES = "interfaces"
 WORDS = (
     "What <code>studio.extending</code> gives: of this a tracker, a likelihood, an export or a calibration format of"
-    ' your own is made. <a href="/guide/adding">Adding your own</a> has an example of each.'
+    " your own is made; and of <code>studio.arena</code> what a racer is made of. "
+    '<a href="/guide/adding">Adding your own</a> has an example of each.'
 )
 ENTRY = re.compile(r"^((?:[a-z_]\w*(?:\([^)]*\))?)(?:, [a-z_]\w*)*) : ", re.MULTILINE)
 """How a docstring's line about a field begins."""
@@ -23,6 +24,7 @@ ENTRY = re.compile(r"^((?:[a-z_]\w*(?:\([^)]*\))?)(?:, [a-z_]\w*)*) : ", re.MULT
 def interfaces_page() -> dict[str, str]:
     """The page on every class, function and constant, in the order of their names."""
     members = {name: getattr(extending, name) for name in dir(extending)}
+    members |= {name: one for name in dir(arena) if inspect.isclass(one := getattr(arena, name))}
     contents = ['<a href="/guide">Guide</a>', '<a href="/guide/adding">Adding your own</a>']
     contents += [f'<a href="#{name}">{name}</a>' for name in members]
     parts = [_member(name, value) for name, value in members.items()]
@@ -33,19 +35,20 @@ def interfaces_page() -> dict[str, str]:
 def _member(name: str, value: Any) -> str:  # noqa: ANN401 - whatever is public
     head = f'<h2 id="{name}"><code>{name}</code></h2>'
     if inspect.isclass(value):
-        methods = [
-            _describe(f"{method}{_signature(function)}", function)
-            for method, function in vars(value).items()
-            if inspect.isfunction(function) and not method.startswith("_")
+        members: dict[str, Any] = {part: one for part, one in vars(value).items() if not part.startswith("_")}
+        parts = [
+            _describe(f"{part}{_signature(one)}" if inspect.isfunction(one) else part, one)
+            for part, one in members.items()
+            if inspect.isfunction(one) or type(one) in (property, cached_property)
         ]
-        return "\n".join([head, text_of(inspect.getdoc(value) or ""), *methods])
+        return "\n".join([head, text_of(inspect.getdoc(value) or ""), *parts])
     if inspect.isfunction(value):
         return f"{head}\n{_describe(f'{name}{_signature(value)}', value)}"
     return f"{head}\n<p><code>{html.escape(repr(value))}</code></p>"
 
 
-def _describe(call: str, function: Callable[..., object]) -> str:
-    return f"<h3><code>{html.escape(call)}</code></h3>\n{text_of(inspect.getdoc(function) or '')}"
+def _describe(call: str, one: object) -> str:
+    return f"<h3><code>{html.escape(call)}</code></h3>\n{text_of(inspect.getdoc(one) or '')}"
 
 
 def _signature(function: Callable[..., object]) -> str:
