@@ -14,7 +14,7 @@ from studio.results.comparison import trials as kinds
 from studio.results.comparison.statistics import number
 from studio.results.comparison.trials import Outcome, Scale
 
-BUDGET, QUICK_BUDGET = 10_000, 1000
+BUDGET, QUICK_BUDGET = 5000, 1000
 
 
 def trials(scale: Scale) -> tuple[kinds.Trial, ...]:
