@@ -48,6 +48,10 @@ def test_bodies_travel(installed: Path, tmp_path: Path) -> None:
     assert "human31" in listed.stdout
 
 
+def test_the_arena_s_problems_travel(installed: Path) -> None:
+    assert (installed / "studio" / "results" / "arena" / "problems.npz").stat().st_size > 1_000_000
+
+
 def test_the_network_travels_with_its_licence(installed: Path) -> None:
     models = installed / "studio" / "evidence" / "models"
     readme = (models / "README.md").read_text()

@@ -90,7 +90,8 @@ def _racer_of_tracker(name: str) -> Racer:
             seed=seed,
             frame=0,
             settings_source=lambda: (0, settings),
-            repeats=1 + budget // tracker.evaluations(settings),
+            # More than there can be: the budget ends it.
+            repeats=1 + budget,
         )
 
     return Racer(name, tracker.label, search)
