@@ -1,6 +1,9 @@
 """The arena's verbs on a toy set: races are kept, go on where they were ended, and are drawn from their own numbers."""
 
 import json
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +11,7 @@ import pytest
 from toy_arena import JOINTS, PART, ToyArena, make_arena
 
 import studio
+from studio.operations.jobs.trials import run_jobs
 from studio.results.arena.profiles import running_time
 from studio.sessions.process_lock import ProcessLock
 
@@ -21,6 +25,14 @@ def search(problem, seed):
 
 RACER = Racer("mine", "Mine", search)
 """
+
+
+@pytest.fixture(autouse=True)
+def _in_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Trials run in this process: how processes are started is measured by the tests of commands and of the API."""
+    with ThreadPoolExecutor(1) as executor:
+        monkeypatch.setattr("studio.operations.arena.run_jobs", partial(run_jobs, executor=executor))
+        yield
 
 
 @pytest.fixture(scope="module")
