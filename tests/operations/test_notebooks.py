@@ -55,3 +55,12 @@ def test_a_posterior_of_a_pose() -> None:
     evidence = names["evidence"]
     assert evidence["own"] > evidence["a tenth larger"]  # pyright: ignore[reportIndexIssue]
     assert "chain-2" in [run.name for run in studio.list_runs("walk-small")]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.usefixtures("here")
+def test_a_race_of_ones_own() -> None:
+    names = run_notebook(next(path for path in NOTEBOOKS if path.stem == "a_race_of_ones_own"))
+    assert "my-search" in names["raced"].document["findings"]["words"]  # pyright: ignore[reportAttributeAccessIssue]
+    assert names["heights"][-1] > names["heights"][0]  # pyright: ignore[reportIndexIssue]
