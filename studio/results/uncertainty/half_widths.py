@@ -53,10 +53,10 @@ FEWEST_FRAMES = 8
 UNSEEN = (LOST, NO_EVIDENCE)
 WIDER = 1.3
 """By what a twin's errors are multiplied: its motion is one that the tracker finds, and its person is built as drawn
-people are. On six drawn clips of the choosing half (walk, kick, leap, turns, dance, arms) errors are 1.2 to 1.6 times
-their twins' in the mean; with 1.3, 54 and 85 % of frames are within what is promised for 50 and 80 %. Divided by how
-much silhouettes disagree in each frame, half widths are as wide and hold as often (turns, dance), so a joint has the
-same in all frames.
+people are. On eight drawn clips of the choosing half (walk, kick, leap, turns, dance, arms, run, sit; one seed) errors
+are 1.2 to 1.6 times their twins' in the mean; with 1.3, 54 and 85 % of frames are within what is promised for 50 and
+80 %. Divided by how much silhouettes disagree in each frame, half widths are as wide and hold as often (turns, dance),
+so a joint has the same in all frames.
 """
 STALE = "the run's poses, its masks or its cameras have changed"
 NOT_IN_IT = (
