@@ -155,7 +155,11 @@ export function seriesOption(chart, width, selected) {
     series: [
       ...ground(chart),
       ...chart.series.flatMap((series) =>
-        (chart.stacked ? stackedParts : bars ? barParts : lineParts)(chart, series, known.get(groupOf(series))),
+        (chart.stacked ? stackedParts : bars ? barParts : lineParts)(
+          chart,
+          series,
+          known.get(groupOf(series)),
+        ),
       ),
     ],
   };
