@@ -381,12 +381,14 @@ function scheduleOfFrame(sheet, tables, at) {
     sheet.chosen(plot, { column: at.layer });
   };
   const asked = { dashed: true, stepped: true };
+  /** @type {[string, string, string, any][]} */
+  const moves = has("acceptance") ? [["moves taken", "acceptance", "layer-9", {}]] : [];
   const betas = sides.flatMap((side) => side.tables.layers.map((row) => row.beta));
   const positive = betas.every((value) => value === null || value > 0);
   if (has("alpha_reached"))
     draw(0, "Survival α", "dashed: asked", numbers("", { min: 0, max: 1, scale: false }), [
       ["asked", "alpha_wanted", "text-quiet", asked],
-      ...(has("acceptance") ? [["moves taken", "acceptance", "layer-9", {}]] : []),
+      ...moves,
       ["reached", "alpha_reached", "accent", {}],
     ]);
   else draw(0, "Best log weight", "nats", numbers(), [["best", "best_log_weight", "accent", {}]]);
