@@ -42,6 +42,14 @@ class BudgetSpentError(StudioError, status=409, code="budget"):
     """All evaluations that a race allows are spent: it ends a racer, which need not catch it."""
 
 
+class DeafError(BaseException):
+    """A racer goes on asking though its evaluations are spent: no `except Exception` of its own keeps this one."""
+
+
+MOST_REFUSED = 100
+"""Times that a racer may ask after its evaluations are spent."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewMaps:
     """What a camera saw. mask, edges, hidden : (H, W) as in `ViewEvidence`."""
@@ -198,7 +206,7 @@ class Improvement(NamedTuple):
     pose: Array
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Problem:
     """A frame for an optimiser: it is asked for poses and told their log-likelihoods, larger is better.
 
@@ -211,6 +219,11 @@ class Problem:
     evaluations: int = 0
     seconds: float = 0.0
     improvements: list[Improvement] = field(default_factory=list[Improvement])
+    _refused: int = 0
+
+    def __repr__(self) -> str:
+        budget = "" if self.budget is None else f" of {self.budget}"
+        return f"<Problem '{self.name}', {self.dimensions} parameters, {self.kind}: {self.evaluations}{budget} spent>"
 
     @property
     def name(self) -> str:
@@ -308,7 +321,7 @@ class Problem:
         """(N,) of poses (N, D), mm and radians; -inf outside the bounds. Each pose counts as one evaluation.
 
         Raises ArenaError for poses that are no finite (N, D), BudgetSpentError beyond the budget, once the poses within
-        it are weighed.
+        it are weighed, and DeafError to who asks MOST_REFUSED times more.
         """
         given = self._checked(poses)
         left = len(given) if self.budget is None else max(0, self.budget - self.evaluations)
@@ -317,6 +330,9 @@ class Problem:
         self.seconds += time.perf_counter() - began
         self._note(within, weights)
         if left < len(given):
+            self._refused += 1
+            if self._refused > MOST_REFUSED:
+                raise DeafError
             raise BudgetSpentError(
                 f"All {self.budget} evaluations of problem '{self.name}' are spent.",
                 "Take `problem.heaviest`, or begin with problem.again(budget=…).",

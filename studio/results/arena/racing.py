@@ -9,7 +9,7 @@ from typing import Any
 
 from studio.foundations.errors import StudioError
 from studio.foundations.foreign_files import read_file
-from studio.results.arena.problem import ArenaError, BudgetSpentError, Definition, Problem
+from studio.results.arena.problem import ArenaError, BudgetSpentError, DeafError, Definition, Problem
 from studio.results.arena.problem_files import BUNDLED, read_problems
 from studio.results.arena.profiles import Trial
 from studio.results.arena.racers import RACERS, SUFFIX, Racer, racer_named
@@ -63,8 +63,11 @@ def planned(
     place : of the problems' file, "" for the bundled ones. Raises ArenaError, UnknownMemberError for a racer.
     """
     known = {name: (racer_named(name).name, _code_of(name)) for name in racers}
-    if len({name for name, _ in known.values()}) < len(racers):
-        raise ArenaError("Two racers have the same name.", "Give each its own, and name each once.")
+    names = [name for name, _ in known.values()]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None or len(names) < len(racers):
+        called = f"'{twice}'" if twice else "the same"
+        raise ArenaError(f"Two racers are called {called}.", "Give each its own name, and name each once.")
     return tuple(
         trials.Trial(
             f"{known[name][0]} on {one.name}, seed {seed}",
@@ -129,6 +132,11 @@ def run_racer(racer: Racer, problem: Problem, seed: int) -> None:
         racer.search(problem, seed)
     except BudgetSpentError:
         return
+    except DeafError:
+        raise ArenaError(
+            f"{where} goes on asking though its evaluations are spent.",
+            "Let BudgetSpentError end it: an `except Exception` around problem.log_likelihood keeps it from that.",
+        ) from None
     except StudioError as error:
         raise ArenaError(f"{where}: {error.message}", error.hint) from error
     except Exception as error:

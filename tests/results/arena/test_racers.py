@@ -83,6 +83,11 @@ def test_the_guide_s_racer_is_raced_from_its_file(arena: ToyArena, tmp_path: Pat
 
 
 HEAD = "from studio.arena import Racer\nimport numpy as np\n"
+DEAF = """while True:
+        try:
+            problem.log_likelihood(problem.prior.start[None])
+        except Exception:
+            continue"""
 
 
 @pytest.mark.parametrize(
@@ -92,6 +97,7 @@ HEAD = "from studio.arena import Racer\nimport numpy as np\n"
         ("problem.log_likelihood(np.full((3, problem.dimensions), np.nan))", "was given nan for 'x1'"),
         ("problem.log_likelihood([1.0])", "array of shape"),
         ("pass", "weighed no pose"),
+        (DEAF, "goes on asking though its evaluations are spent"),
     ],
 )
 def test_a_racer_that_goes_wrong_is_named_with_problem_seed_and_cause(
@@ -132,3 +138,11 @@ def test_a_package_adds_a_racer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     registry = Registry("racer", "studio.racers", Racer, (), lambda racer: None)
     assert list(registry) == ["packed"]
     assert registry["packed"].label == "My search"
+
+
+def test_a_problem_shows_itself_in_a_line(arena: ToyArena) -> None:
+    problem = raced(arena, RACERS["random-search"])
+    assert (
+        repr(problem)
+        == f"<Problem '{problem.name}', 4 parameters, {problem.kind}: {BUDGET} of {BUDGET} spent>"
+    )
