@@ -33,6 +33,7 @@ from studio.operations.masks import mask_quality as mask_quality
 from studio.operations.notes import note as note
 from studio.operations.notes import notes as notes
 from studio.operations.opening import bodies as bodies
+from studio.operations.opening import inference_data as inference_data
 from studio.operations.opening import list_runs as list_runs
 from studio.operations.opening import list_sessions as list_sessions
 from studio.operations.opening import open_run as open_run

@@ -9,7 +9,7 @@ import msgspec
 from studio.foundations.errors import NotFoundError, StudioError
 from studio.foundations.knobs import Value
 from studio.search.settings import changed_settings, default_settings, in_todays_names, knob_table, values
-from studio.search.trackers.catalogue import TRACKERS, presets
+from studio.search.trackers.catalogue import presets
 from studio.search.trackers.tracker import Preset
 from studio.sessions.record_files import Entries, RecordFile
 
@@ -62,11 +62,13 @@ def _with_trackers(entries: Entries) -> Entries:
     for name, kept in entries.items():
         if name != "schema":
             wanted = in_todays_names(kept["values"])
-            having = [one for one in TRACKERS if wanted.keys() <= values(default_settings(one)).keys()]
+            having = [one for one in OF_THAT_TIME if wanted.keys() <= values(default_settings(one)).keys()]
             by_name[name] = {**kept, "values": wanted, "tracker": having[0] if len(having) == 1 else ""}
     return {"presets": by_name, "schema": 2}
 
 
+OF_THAT_TIME = ("annealed", "behaviour", "condensation", "swarm")
+"""The trackers of presets of the first version."""
 _KEPT = RecordFile(
     _File,
     "a list of kept presets",

@@ -8,6 +8,7 @@ import re
 import tempfile
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from command_line import answer_of, call, refusal_of
@@ -24,8 +25,10 @@ from studio.sessions.session import Session
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help(name: str) -> None:
-    result = call(name, "--help")
-    assert "--json" in result.output
+    command = load(name)
+    parts = [[name, part] for part in command.commands] if isinstance(command, click.Group) else [[name]]
+    for words in parts:
+        assert "--json" in call(*words, "--help").output
 
 
 @pytest.mark.parametrize("name", COMMANDS)
