@@ -63,11 +63,12 @@ def planned(
     place : of the problems' file, "" for the bundled ones. Raises ArenaError, UnknownMemberError for a racer.
     """
     known = {name: (racer_named(name).name, _code_of(name)) for name in racers}
-    names = [name for name, _ in known.values()]
+    names = [known[name][0] for name in racers]
     twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None or len(names) < len(racers):
-        called = f"'{twice}'" if twice else "the same"
-        raise ArenaError(f"Two racers are called {called}.", "Give each its own name, and name each once.")
+    if twice is not None:
+        raise ArenaError(
+            f"Two racers have the same name, '{twice}'.", "Give each its own, and name each once."
+        )
     return tuple(
         trials.Trial(
             f"{known[name][0]} on {one.name}, seed {seed}",
