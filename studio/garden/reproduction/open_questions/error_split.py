@@ -16,30 +16,26 @@ import numpy as np
 
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
-from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.progress import report
 from studio.garden.reproduction.deutscher_reid.weight_of_a_knee import true_poses
 from studio.garden.reproduction.experiment import Part, each_seed, group_of, listed
+from studio.garden.reproduction.open_questions.searched_clip import SearchedClip
 from studio.garden.reproduction.tracking import Candidate
 from studio.results.comparison.findings import Chart, Series, Table
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.statistics import number
-from studio.results.comparison.tracked import TrackingTrial, measured
+from studio.results.comparison.tracked import TrackingTrial
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.results.inspection.long_search import FIRST_STEP_MM, climb, parameters_a_mm
-from studio.runs.live.following import Following
-from studio.runs.search_space import search_space, session_sigma
-from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.problem import FrameLikelihood
-from studio.search.settings import RunSettings, changed_settings, default_settings
+from studio.search.settings import DEFAULT_WEIGHTING, changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.search.trackers.frame_loop import search_frame
 from studio.search.trackers.tracker import start_of
-from studio.sessions.session import Session
 
 CLIPS = ("walk", "choosing-turns", "choosing-kick")
-WEIGHTING = "edge-region-silhouette"
+WEIGHTING = DEFAULT_WEIGHTING
 EVALUATIONS = (250, 1000, 4000, 16_000)
 CANDIDATES = tuple(
     Candidate(name, tracker, WEIGHTING, {"refine_frames": False})
@@ -90,7 +86,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         return _reference(arguments, cache)
     attempt = TrackingTrial.of_plain(arguments)
     settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), attempt.changes)
-    scene = _Scene(cache, attempt.footage, settings)
+    scene = SearchedClip(cache, attempt.footage, settings)
     run = scene.followed(attempt.seed)
     weights, last = dict[int, float](), int(attempt.last or 0)
     for frame in range(last):
@@ -109,7 +105,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
 
 def _reference(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     settings = changed_settings(default_settings("annealed", WEIGHTING), {"refine_frames": False})
-    scene = _Scene(cache, str(arguments["clip"]), settings)
+    scene = SearchedClip(cache, str(arguments["clip"]), settings)
     frames = list(range(0, int(arguments["last"]), EVERY))
     before = true_poses(scene.session, scene.body, [max(frame - 1, 0) for frame in frames])
     laid, best = true_poses(scene.session, scene.body, frames), list[Array]()
@@ -118,7 +114,7 @@ def _reference(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, A
         problem = scene.problem(frame)
         poses = [
             laid[at],
-            *(scene.searched(problem, before[at], frame, name) for name in ("annealed", "tempered")),
+            *(_searched(scene, problem, before[at], frame, name) for name in ("annealed", "tempered")),
         ]
         climbed = [_climb(scene.body, problem, pose, frame, int(arguments["steps"])) for pose in poses]
         pose, weight = max(climbed, key=lambda one: one[1])
@@ -133,52 +129,22 @@ def _reference(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, A
     }
 
 
-class _Scene:
-    """A clip with what a search needs."""
-
-    def __init__(self, cache: FootageCache, clip: str, settings: RunSettings) -> None:
-        self.cache, self.settings = cache, settings
-        self.session: Session = cache.session(clip)
-        self.body, self.cameras = self.session.body(), self.session.cameras()
-        sigma = session_sigma(self.session, self.body, self.session.manifest.fps)
-        self.space = search_space(self.body, sigma)
-        self.likelihood = WEIGHTINGS[WEIGHTING].prepare(self.body, self.cameras, settings.weighting)
-
-    def problem(self, frame: int) -> FrameLikelihood:
-        """The likelihood of a frame."""
-        return self.likelihood.problem(self._seen(frame))
-
-    def _seen(self, frame: int) -> FrameEvidence:
-        chosen = WEIGHTINGS[WEIGHTING]
-        return self.cache.evidence(
-            self.session, self.cameras, frame, self.settings.evidence, chosen.edge_kind, chosen.reads_pictures
-        )
-
-    def followed(self, seed: int) -> Following:
-        """A run that begins in the session's start pose."""
-        start = self.session.start_pose(self.body)
-        return Following(
-            self.settings, self.space, start_of(None if start is None else tuple(map(float, start))), seed
-        )
-
-    def searched(self, problem: FrameLikelihood, before: Array, frame: int, tracker: str) -> Array:
-        """(D,) the heaviest that a search with LONG evaluations finds about the pose of the frame before."""
-        own = TRACKERS[tracker]
-        knobs = dataclasses.replace(own.settings_type(), **knobs_for_evaluations(tracker, LONG))
-        result = search_frame(
-            own,
-            problem,
-            start_of(tuple(map(float, before))),
-            self.space,
-            seed=7,
-            frame=frame,
-            settings_source=lambda: (1, knobs),
-        )
-        return result.estimate.mode
-
-    def errors(self, poses: Array, frames: Sequence[int]) -> list[float]:
-        """Of each frame, mm from the true markers."""
-        return measured(self.session, self.body, poses, np.array(frames), 0, 0.0).per_frame_mm
+def _searched(
+    scene: SearchedClip, problem: FrameLikelihood, before: Array, frame: int, tracker: str
+) -> Array:
+    """(D,) the heaviest that a search with LONG evaluations finds about the pose of the frame before."""
+    own = TRACKERS[tracker]
+    knobs = dataclasses.replace(own.settings_type(), **knobs_for_evaluations(tracker, LONG))
+    result = search_frame(
+        own,
+        problem,
+        start_of(tuple(map(float, before))),
+        scene.space,
+        seed=7,
+        frame=frame,
+        settings_source=lambda: (1, knobs),
+    )
+    return result.estimate.mode
 
 
 def _climb(

@@ -22,27 +22,23 @@ import numpy as np
 
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array
-from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import report
 from studio.garden.reproduction.claims import geometric_mean, share
 from studio.garden.reproduction.deutscher_reid.arms import TemplateArm, silhouette, template_arm
 from studio.garden.reproduction.experiment import Part, group_of, listed
 from studio.garden.reproduction.open_questions.posterior import LEVELS, band, distribution, rank
+from studio.garden.reproduction.open_questions.searched_clip import SearchedClip
 from studio.results.comparison.findings import Chart, Series, Table
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.statistics import number
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
-from studio.runs.live.following import Following
-from studio.runs.search_space import search_space, session_sigma
-from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.problem import FrameLikelihood
-from studio.search.settings import RunSettings, default_settings
+from studio.search.settings import DEFAULT_WEIGHTING, default_settings
 from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.search.trackers.frame_loop import search_frame
 from studio.search.trackers.frame_prior import FramePrior
 from studio.search.trackers.random_numbers import RandomNumbers
-from studio.search.trackers.tracker import FilterState, LayerRecord, start_of
-from studio.sessions.session import Session
+from studio.search.trackers.tracker import FilterState, LayerRecord
 
 ARM_BODIES = ("planar_arm4", "branched_arms6")
 TURNED = 0.3
@@ -173,7 +169,6 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 
 
 PEOPLE_CLIPS = ("walk", "choosing-turns")
-WEIGHTING = "edge-region-silhouette"
 AT_FRAMES, QUICK_FRAMES = (4, 12), (4,)
 SIZES = (5000, 20_000, 80_000)
 CHAINS, GENERATIONS, QUICK_GENERATIONS, KEPT_EVERY = 200, 5000, 200, 25
@@ -207,18 +202,12 @@ def measure_people(arguments: Mapping[str, Any], cache: FootageCache) -> dict[st
     """Of clouds of each size: the distance of their means from the chains' in the chains' deviations, root mean square
     over the parameters; the geometric mean of the deviations over the chains'; log evidence.
     """
-    session, last = cache.session(arguments["clip"]), int(arguments["frame"])
-    body, cameras = session.body(), session.cameras()
-    settings = default_settings("tempered", WEIGHTING)
-    likelihood = WEIGHTINGS[WEIGHTING].prepare(body, cameras, settings.weighting)
-    space = search_space(body, session_sigma(session, body, session.manifest.fps))
-    start = session.start_pose(body)
-    run = Following(
-        settings, space, start_of(None if start is None else tuple(map(float, start))), int(arguments["seed"])
-    )
+    settings, last = default_settings("tempered", DEFAULT_WEIGHTING), int(arguments["frame"])
+    scene = SearchedClip(cache, arguments["clip"], settings)
+    run = scene.followed(int(arguments["seed"]))
     for frame in range(last):
-        run.step(frame, likelihood.problem(_seen(cache, session, cameras, frame, settings)))
-    problem = likelihood.problem(_seen(cache, session, cameras, last, settings))
+        run.step(frame, scene.problem(frame))
+    problem, space = scene.problem(last), scene.space
     before, own = run.carried, settings.tracker
     prior = FramePrior.of_frame(before, space, scale=own.diffusion_scale, dynamics=own.dynamics, bounded=True)
     chains = chains_of(
@@ -287,13 +276,6 @@ def chains_of(
     return np.concatenate(kept)
 
 
-def _seen(
-    cache: FootageCache, session: Session, cameras: tuple[Camera, ...], frame: int, settings: RunSettings
-) -> FrameEvidence:
-    chosen = WEIGHTINGS[WEIGHTING]
-    return cache.evidence(session, cameras, frame, settings.evidence, chosen.edge_kind, chosen.reads_pictures)
-
-
 def people_shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """By size: how far clouds are from the chains."""
     sizes = dict.fromkeys(size for outcome in outcomes for size in outcome.measured["clouds"])
@@ -315,7 +297,7 @@ def people_shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield number("the chains' first and second half apart", apart, "deviations")
     heads = ("frame", "evaluations", "means off (deviations)", "spread (×)", "log evidence (nats)")
     yield Table("Every frame", heads, tuple(rows))
-    yield {"weighting": WEIGHTING, "chains": CHAINS, "generations": GENERATIONS}
+    yield {"weighting": DEFAULT_WEIGHTING, "chains": CHAINS, "generations": GENERATIONS}
 
 
 KEYS = ("off", "spread", "log_evidence")
