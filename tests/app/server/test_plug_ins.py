@@ -162,7 +162,8 @@ def test_the_page_is_offered_them_and_tracks_with_them(page: Page) -> None:
         },
     )
     assert made["tracker"] == "random"
-    page.post("/api/scene/show", {"session": "toy", "run": "own"}, code=204)
+    shown = page.client.post("/api/scene/show", json={"session": "toy", "run": "own"})
+    assert shown.status_code == 204
     page.post("/api/sessions/toy/runs/own/start")
     page.until("state", state="finished")
     summary = get("/api/sessions/toy/runs/own/frames").json()

@@ -26,6 +26,11 @@ class Page:
     def __init__(self, client: httpx.Client, socket: ClientConnection, control: StudioControl) -> None:
         self.client, self.socket, self.control = client, socket, control
 
+    def get(self, path: str) -> dict:
+        answer = self.client.get(path)
+        assert answer.is_success, answer.text
+        return answer.json()
+
     def post(self, path: str, body: object = None) -> dict:
         answer = self.client.post(path, json=body)
         assert answer.is_success, answer.text
@@ -68,8 +73,8 @@ def test_from_a_new_run_to_its_end_and_into_the_trash(page: Page) -> None:
     page.post(f"{RUN}/step-layer")
     assert page.until("layer")["layer"] == 0
     page.until("state", state="paused", frame=0, layer=1)
-    assert [layer["layer"] for layer in client.get(f"{RUN}/frames/0").json()["layers"]] == [0]
-    assert client.get(f"{RUN}/frames").json()["partial"] == 0
+    assert [layer["layer"] for layer in page.get(f"{RUN}/frames/0")["layers"]] == [0]
+    assert page.get(f"{RUN}/frames")["partial"] == 0
     page.post(f"{RUN}/step-frame")
     stored = page.until("frame", frame=0, reannealed=False)
     page.until("state", state="paused", frame=1)
@@ -81,13 +86,13 @@ def test_from_a_new_run_to_its_end_and_into_the_trash(page: Page) -> None:
     assert answer["alpha_wanted"] == 0.77
     assert answer["waited_milliseconds"] > 0.0
     assert page.until("frame", reannealed=True)["pose"] != stored["pose"]
-    assert client.get(f"{RUN}/frames/0").json()["pose"] == stored["pose"]
+    assert page.get(f"{RUN}/frames/0")["pose"] == stored["pose"]
 
     page.post(f"{RUN}/start")
     page.until("settings", version=2)
     page.until("state", state="finished")
-    assert [entry["frame"] for entry in client.get(f"{RUN}/frames").json()["frames"]] == [0, 1, 2]
-    assert any("Finished" in line["text"] for line in client.get(f"{RUN}/log").json()["lines"])
+    assert [entry["frame"] for entry in page.get(f"{RUN}/frames")["frames"]] == [0, 1, 2]
+    assert any("Finished" in line["text"] for line in page.get(f"{RUN}/log")["lines"])
 
     # It is still open in the tracking process, and can be renamed and deleted all the same.
     renamed = client.patch(RUN, json={"name": "done"})
@@ -120,5 +125,6 @@ def test_when_the_process_is_killed_the_page_is_reported_and_start_resumes(page:
 @pytest.mark.slow
 def test_a_refusal_of_the_process_reaches_the_page_in_words(page: Page) -> None:
     page.post("/api/sessions/take1/runs", {"name": "small", "settings": SMALL})
-    wrong = page.patch(f"{RUN}/settings", {"start_repeats": 3}, code=422)
-    assert "new run" in wrong["hint"].lower()
+    wrong = page.client.patch(f"{RUN}/settings", json={"start_repeats": 3})
+    assert wrong.status_code == 422
+    assert "new run" in wrong.json()["hint"].lower()
