@@ -211,13 +211,9 @@ def words_of(known: Uncertainty) -> tuple[str, ...]:
 
 def true_coverage(run: InspectedRun, known: Uncertainty) -> dict[str, tuple[float | None, ...]]:
     """By point, the share of frames whose true point is within each half width; {} without a truth."""
-    track = reported(run.run)
-    truth = {at: true_points(run, frame) for at, frame in enumerate(track.frames.tolist())}
-    known_points = {at: points for at, points in truth.items() if points is not None}
-    if not known_points:
+    off = true_errors(run, known)
+    if not len(off):
         return {}
-    reports = body_points(run.body, track.poses[[*known_points]])
-    off: Array = np.linalg.norm(reports - np.stack([*known_points.values()]), axis=2)
     shares: dict[str, tuple[float | None, ...]] = {}
     for at, point in enumerate(known.points):
         measured: Array = off[np.isfinite(off[:, at]), at]
@@ -226,6 +222,18 @@ def true_coverage(run: InspectedRun, known: Uncertainty) -> dict[str, tuple[floa
             for width in point.half_widths_mm
         )
     return shares
+
+
+def true_errors(run: InspectedRun, known: Uncertainty) -> Array:
+    """(F, M) how far points are from the truth, mm, in the frames that have one; NaN of a point that has none."""
+    track = reported(run.run)
+    truth = {at: true_points(run, frame) for at, frame in enumerate(track.frames.tolist())}
+    known_points = {at: points for at, points in truth.items() if points is not None}
+    if not known_points:
+        return np.empty((0, len(known.points)))
+    reports = body_points(run.body, track.poses[[*known_points]])
+    off: Array = np.linalg.norm(reports - np.stack([*known_points.values()]), axis=2)
+    return off
 
 
 def frames_of_twin(run: InspectedRun) -> range:

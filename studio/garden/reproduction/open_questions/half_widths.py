@@ -29,13 +29,14 @@ from studio.results.comparison.statistics import number
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.results.inspection.reading import InspectedRun
 from studio.results.uncertainty.conformal import LEVELS
-from studio.results.uncertainty.half_widths import measure_uncertainty, true_coverage
+from studio.results.uncertainty.half_widths import measure_uncertainty, true_coverage, true_errors
 from studio.results.uncertainty.twin import track_to_end
 from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.sessions.session import Session
 
 QUICK_FRAMES, QUICK_KINDS = 20, ("walk",)
+SHARES = tuple(np.linspace(0.0, 1.0, 41).tolist())
 PERCENT = tuple(round(100 * level) for level in LEVELS)
 
 
@@ -53,8 +54,9 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
 @kept_as("open_questions.half_widths.measure")
 def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
-    """Of a clip, by joint and level: half widths (mm), shares of frames within by the truth; of the run, its frames,
-    blocks, and the twin's processor time over that of tracking. Of a run that is refused, why.
+    """Of a clip, by joint and level: half widths (mm), shares of frames within by the truth; by joint, quantiles of
+    its true errors (mm) at SHARES; of the run, its frames, blocks, and the twin's processor time over that of tracking.
+    Of a run that is refused, why.
     """
     with tempfile.TemporaryDirectory(prefix="studio-half-widths-") as folder:
         place = Path(folder) / "clip"
@@ -72,11 +74,12 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
             return {"refused": refusal.message}
         assert known is not None
         drawn = time.process_time()
-        truth = true_coverage(opened, known)
+        truth, errors = true_coverage(opened, known), true_errors(opened, known)
     return {
         "joints": [point.point for point in known.points],
         "half_widths": [list(point.half_widths_mm) for point in known.points],
         "within": [list(truth[point.point]) for point in known.points],
+        "errors": [np.nanquantile(errors[:, at], SHARES).tolist() for at in range(errors.shape[1])],
         "frames": known.frames,
         "blocks": known.blocks,
         "times": (drawn - tracked) / (tracked - began),
