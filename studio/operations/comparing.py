@@ -61,7 +61,7 @@ from studio.sessions.remote_sessions import (
 )
 from studio.sessions.session import Session
 
-MOST_TRACKERS = 12
+MOST_TRACKERS, MOST_SPLIT = 12, 60
 USUAL = tuple(name for name in sorted(TRACKERS) if not needs_model(name, None))
 
 
@@ -94,6 +94,14 @@ class CompareRequest:
     layers: Annotated[
         int, Field(ge=1, le=60, description="Layers of trackers whose layers can be chosen.")
     ] = DEFAULT_LAYERS
+    split_frames: Annotated[
+        int,
+        Field(
+            ge=0,
+            le=MOST_SPLIT,
+            description="Frames of each trial in which it is measured whose fault the error is.",
+        ),
+    ] = 0
     changes: Annotated[
         Mapping[str, Mapping[str, object]] | None,
         Field(description='Knobs by tracker; under "" for all trackers that have them.'),
@@ -115,6 +123,7 @@ class CompareRequest:
             last=self.last,
             body=self.body,
             behaviour=self.behaviour,
+            split_frames=self.split_frames,
         )
 
 

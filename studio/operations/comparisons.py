@@ -77,6 +77,9 @@ class ComparisonDetail:
     behaviour: str
     fit_shape: Annotated[bool, Field(description="Of a sweep: whether each run fits the body's shape.")]
     fps: FiniteFloat
+    split_frames: Annotated[
+        int, Field(description="Of each trial, in how many it is measured whose fault errors are.")
+    ]
     settings: dict[str, dict[str, Value]]
     result: dict[str, Any] | None
     trials: list[TrialLine]
@@ -194,6 +197,7 @@ def comparison_detail(
         body=plan.body,
         behaviour=plan.behaviour,
         fit_shape=plan.fit_shape,
+        split_frames=plan.split_frames,
         fps=plan.fps,
         settings={one.name: {WEIGHTING: one.weighting, **one.changes} for one in plan.candidates},
         result=kept.result(),

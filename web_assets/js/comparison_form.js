@@ -240,6 +240,10 @@ export function showForm(content, { sessions, choices, bodies, initial, started,
           "Layers, where they can be chosen",
           whole("layers", initial.layers ?? 10, { min: 1, max: 60 }),
         ),
+        field(
+          "Frames that tell whose fault errors are",
+          whole("split_frames", initial.split_frames ?? 0, { min: 0, max: 60 }),
+        ),
         field("Body", body),
         field(
           "Name",
@@ -321,6 +325,7 @@ export function showForm(content, { sessions, choices, bodies, initial, started,
         first: Number(value("first")),
         last: Number(value("last")) + 1,
         layers: Number(value("layers")),
+        split_frames: Number(value("split_frames")),
       }),
     ),
   );

@@ -34,6 +34,8 @@ const BADGES = {
   failed: "bad",
 };
 const SIGNIFICANT = 0.05;
+const FAULTS =
+  "The search's part goes with more evaluations; the likelihood's and the body's do not. Below zero: a heavier pose is known that is farther off.";
 
 let disposals = [];
 
@@ -178,7 +180,7 @@ function progressBox(line, actions) {
 }
 
 function results({ result, trials }, actions) {
-  const [curves, seeds] = result.findings.charts;
+  const [curves, seeds, faults] = result.findings.charts;
   const nearer = card("Which is nearer", signTests(result));
   const several = result.seeds.length > 1;
   const overFrames = (name, at) =>
@@ -194,6 +196,7 @@ function results({ result, trials }, actions) {
     card("", element("div", { className: "scrolls" }, figures(result))),
     card("", drawn(curves, overFrames)),
     element("section", { className: "pair" }, nearer, card("", drawn(seeds, overSeeds))),
+    faults && card("", drawn(faults), hint(FAULTS)),
     trialsCard(trials, actions),
   ];
 }

@@ -178,7 +178,7 @@ function removeForm(line) {
 }
 
 /** What the form has to be filled with to compare the same again. */
-function initialLike({ comparison: line, settings, body }) {
+function initialLike({ comparison: line, settings, body, split_frames }) {
   const weightings = new Set(line.trackers.map((name) => settings[name].weighting));
   const common = weightings.size === 1 ? [...weightings][0] : null;
   const trackers = line.trackers.map((name) => {
@@ -202,6 +202,7 @@ function initialLike({ comparison: line, settings, body }) {
     first: line.first,
     last: line.last,
     layers,
+    split_frames,
   };
 }
 

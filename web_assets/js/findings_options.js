@@ -422,10 +422,6 @@ function band(chart, series, name, colour) {
   };
 }
 
-/**
- * Bars stand side by side; a thin series is dots on its group's bar; what the paper printed a
- * dashed stroke over it.
- */
 /** A bar's part, on those of the series before it; parts below zero hang from it. */
 function stackedParts(chart, series, group) {
   return [
@@ -441,6 +437,10 @@ function stackedParts(chart, series, group) {
   ];
 }
 
+/**
+ * Bars stand side by side; a thin series is dots on its group's bar; what the paper printed a
+ * dashed stroke over it.
+ */
 function barParts(chart, series, group) {
   const colour = token(group.colour);
   const name = legendName(chart, series);

@@ -7,6 +7,7 @@ from studio.foundations.words import counted
 from studio.results.comparison.findings import Chart, Findings, Series, Table
 from studio.results.comparison.plan import Comparison, PairTest, TrackerResult
 from studio.results.comparison.statistics import SignTest, number
+from studio.results.inspection.error_parts import BODY, LIKELIHOOD, SEARCH
 from studio.search.settings import values
 
 SIGNIFICANT = 0.05
@@ -29,7 +30,7 @@ def findings(comparison: Comparison) -> Findings:
             number(f"{result.tracker}: mean error", result.means, "mm") for result in comparison.trackers
         ),
         tables=(_table(comparison), _tests(comparison)) if comparison.pairs else (_table(comparison),),
-        charts=(error_chart(comparison), seeds_chart(comparison)),
+        charts=(error_chart(comparison), seeds_chart(comparison), *parts_charts(comparison)),
         settings=_settings(comparison),
     )
 
@@ -67,6 +68,21 @@ def seeds_chart(comparison: Comparison) -> Chart:
         for result in comparison.trackers
     )
     return Chart("Mean error of each seed", "bars", "seed", "mean error (mm)", series, categories=names)
+
+
+def parts_charts(comparison: Comparison) -> tuple[Chart, ...]:
+    """Whose fault the errors are, a bar a tracker; none where they were not split."""
+    split = [result for result in comparison.trackers if result.parts_mm]
+    places = tuple(map(float, range(len(split))))
+    series = tuple(
+        Series(part, places, tuple(result.parts_mm[part] for result in split), group=part)
+        for part in (BODY, LIKELIHOOD, SEARCH)
+    )
+    chart = Chart(
+        "Whose fault the error is, before refinement", "bars", "tracker", "mean error (mm)", series,
+        categories=tuple(result.tracker for result in split), stacked=True,
+    )  # fmt: skip
+    return (chart,) if split else ()
 
 
 def document(comparison: Comparison) -> dict[str, Any]:
@@ -113,7 +129,7 @@ def in_words(comparison: Comparison) -> str:
     order = ", ".join(f"{result.tracker} {result.mean_mm:.1f} mm" for result in ranked)
     count, seeds = len(comparison.frames), len(comparison.plan.seeds)
     sentences = [f"Mean error over {count} frames and {counted(seeds, 'seed')}, best first: {order}."]
-    sentences += evidence_words(comparison)
+    sentences += [*evidence_words(comparison), *parts_words(comparison)]
     sentences += [pair_words(pair) for pair in comparison.pairs]
     if comparison.pairs:
         sentences.append(NOT_INDEPENDENT)
@@ -133,6 +149,23 @@ def evidence_words(comparison: Comparison) -> list[str]:
     return [
         f"Log evidence, nats a frame: {order}; of candidates with one likelihood and scale, the highest explains the"
         " pictures best."
+    ]
+
+
+def parts_words(comparison: Comparison) -> list[str]:
+    """Whose fault the errors are, in a sentence; none where they were not split."""
+    split = [
+        f"{result.tracker} "
+        + ", ".join(f"{part} {value:.1f}".replace("-", "\N{MINUS SIGN}") for part, value in parts.items())
+        for result in comparison.trackers
+        if (parts := result.parts_mm)
+    ]
+    if not split:
+        return []
+    count = counted(comparison.plan.split_frames, "frame")
+    return [
+        f"Whose part of the error it is, mm before refinement, in {count} of each trial: {'; '.join(split)}.",
+        "The search's is below zero where a heavier pose is known that is farther off.",
     ]
 
 
@@ -238,4 +271,11 @@ def _plain_tracker(result: TrackerResult, seeds: tuple[int, ...]) -> dict[str, A
     }
     if result.log_evidence is not None:
         rounded["log_evidence"] = round(result.log_evidence, 3)
-    return {"tracker": result.tracker, **fields, **rounded, "seeds": runs}
+    split = {"parts_mm": {part: round(value, 3) for part, value in result.parts_mm.items()}}
+    return {
+        "tracker": result.tracker,
+        **fields,
+        **rounded,
+        **(split if result.parts_mm else {}),
+        "seeds": runs,
+    }

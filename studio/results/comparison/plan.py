@@ -36,7 +36,8 @@ class Plan:
     fps : of the footage. body : a name, "" for the session's own. behaviour : name of the model of those that need one,
     "" for none; behaviour_digest : of its file; behaviour_path : its present path. vary : of a sweep the values of each
     knob, whose combinations are the candidates, and evaluations are then the most of any; empty where trackers are
-    compared. fit_shape, allow_inconsistent : of a sweep's runs.
+    compared. fit_shape, allow_inconsistent : of a sweep's runs. split_frames : in how many frames of each trial it is
+    measured whose fault the error is.
     """
 
     footage: str
@@ -54,6 +55,7 @@ class Plan:
     vary: Mapping[str, tuple[Value, ...]] = field(default_factory=dict[str, tuple[Value, ...]])
     fit_shape: bool = False
     allow_inconsistent: bool = False
+    split_frames: int = 0
 
     @property
     def frame_count(self) -> int:
@@ -100,6 +102,12 @@ class TrackerResult:
         return float(np.mean(known)) if len(known) == len(self.seeds) else None
 
     @property
+    def parts_mm(self) -> dict[str, float]:
+        """Mean parts of the error by whose fault they are, over the seeds; {} where it was not split."""
+        split = [seed.parts_mm for seed in self.seeds if seed.parts_mm]
+        return {part: float(np.mean([one[part] for one in split])) for part in split[0]} if split else {}
+
+    @property
     def seconds(self) -> float:
         """Seconds of the search, over all seeds."""
         return sum(seed.seconds for seed in self.seeds)
@@ -143,6 +151,7 @@ def plan_comparison(
     last: int | None = None,
     body: str = "",
     behaviour: str = "",
+    split_frames: int = 0,
 ) -> Plan:
     """A checked plan; lineup.weighting "" means the session's own, behaviour "" the only model that fits where a
     tracker needs one.
@@ -161,7 +170,8 @@ def plan_comparison(
     start_of(session, model, None)
     taking_part = candidates(replace(lineup, weighting=weighting))
     chosen = _chosen_model(session, model, taking_part, behaviour)
-    return plan_of(session, taking_part, lineup.evaluations, seeds, (begin, end), body, chosen)
+    plan = plan_of(session, taking_part, lineup.evaluations, seeds, (begin, end), body, chosen)
+    return replace(plan, split_frames=split_frames)
 
 
 def plan_of(
@@ -253,4 +263,5 @@ def tracking_trial_of(plan: Plan, candidate: Candidate, seed: int) -> TrackingTr
         plan.last,
         body=plan.body,
         behaviour=plan.behaviour_path if guided else "",
+        split_frames=plan.split_frames,
     )

@@ -20,9 +20,11 @@ from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError, TruthError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import report
+from studio.results.comparison.error_shares import error_shares
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.trials import Trial, kept_as
 from studio.results.evaluation.errors import evaluate, rows_of_frames
+from studio.results.inspection.error_parts import PARTS
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.live.following import Following, step_together
 from studio.runs.search_space import search_space, session_sigma
@@ -46,6 +48,8 @@ SEEDS_AT_ONCE, POSES_AT_ONCE = 64, 200_000
 """Most seeds, and most poses of a layer of all of them, that a card searches side by side."""
 AS_PUBLISHED: Mapping[str, Any] = {"refine_frames": False}
 """Knobs without refinement, as in the papers; a trial that refines sets them."""
+LATER_FIELDS = ("behaviour", "shape_frames", "larger", "split_frames")
+"""Of a trial, which outcomes that were kept before they existed do not name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +62,8 @@ class TrackingTrial:
     session's own, such as "subject_shape.toml" of the Lee-walk twin (no hands and feet), "" for its own. sigma_scale :
     multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path. shape_frames :
     number of frames tracked first, to which the shape of the run is fitted (`runs.setup.shape_on_the_way`). larger :
-    share by which the subject's measures are enlarged, a wrong body on purpose.
+    share by which the subject's measures are enlarged, a wrong body on purpose. split_frames : in how many frames,
+    evenly spread, it is measured whose fault the error is (`error_shares`).
     """
 
     footage: str
@@ -76,14 +81,11 @@ class TrackingTrial:
     behaviour: str = ""
     shape_frames: int = 0
     larger: float = 0.0
+    split_frames: int = 0
 
     def plain(self) -> dict[str, Any]:
         """As a trial's arguments; later fields are left out at their defaults, so that stored outcomes stay valid."""
-        return {
-            name: value
-            for name, value in asdict(self).items()
-            if value or name not in ("behaviour", "shape_frames", "larger")
-        }
+        return {name: value for name, value in asdict(self).items() if value or name not in LATER_FIELDS}
 
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "TrackingTrial":
@@ -102,7 +104,8 @@ class Tracked:
     side. named : per frame the limbs that the tracker itself reported lost, as in a run's timeline.
     impossible_frames : frames whose pose breaks a hard prior (a joint beyond its limits, a limb inside another); -1 in
     outcomes that were kept before it was counted. log_evidence : nats a frame, mean over the frames; None where the
-    tracker has none.
+    tracker has none. parts_mm : the search's, the likelihood's and the body's part of the error of what the search
+    found, means over the frames in which it was split; {} where it was not.
     """
 
     frames: list[int]
@@ -117,6 +120,7 @@ class Tracked:
     named: list[list[str]] = field(default_factory=list[list[str]])
     impossible_frames: int = -1
     log_evidence: float | None = None
+    parts_mm: dict[str, float] = field(default_factory=dict[str, float])
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,17 +204,24 @@ def track_seeds(
     ]
     likelihood = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)
     seconds, evaluations, named = 0.0, 0, [list[list[str]]() for _ in runs]
+    truth, split = read_trc(session.truth_path), set(middles(frames, trial.split_frames))
+    shares = [list[Mapping[str, float]]() for _ in runs]
     for number, frame in enumerate(frames):
         seen = evidence(frame)
         began = time.perf_counter()
-        results = step_together(runs, frame, likelihood.problem(seen), seen)
+        problem = likelihood.problem(seen)
+        results = step_together(runs, frame, problem, seen)
         seconds += time.perf_counter() - began if number else 0.0
         evaluations = results[0].evaluations
         for lost, result in zip(named, results, strict=True):
             lost.append(list(result.limbs_lost))
+        for own, result in zip(shares, results if frame in split else (), strict=False):
+            found = result.estimate.pose if result.estimate.searched is None else result.estimate.searched
+            parts = error_shares(body, truth, fps, settings, problem, frame, found)
+            own += [] if parts is None else [parts]
         report("tracking", number + 1, len(frames))
     tracked: list[Tracked] = []
-    for run, lost, own in zip(runs, named, evidences, strict=True):
+    for run, lost, own, parts in zip(runs, named, evidences, shares, strict=True):
         poses = np.array(run.poses)
         if settings.refinement.refine_frames:
 
@@ -234,9 +245,18 @@ def track_seeds(
                 named=named_of,
                 impossible_frames=impossible,
                 log_evidence=round(evidence_mean, 3) if math.isfinite(evidence_mean) else None,
+                parts_mm={name: round(float(np.mean([one[name] for one in parts])), 3) for name in PARTS}
+                if parts
+                else {},
             )
         )
     return tracked
+
+
+def middles(frames: range, count: int) -> list[int]:
+    """The frames in the middle of `count` even stretches of them; all of them where there are fewer."""
+    count = min(count, len(frames))
+    return [frames[int((at + 0.5) * len(frames) / count)] for at in range(count)]
 
 
 def settings_of(trial: TrackingTrial) -> RunSettings:

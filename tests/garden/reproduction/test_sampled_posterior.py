@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from studio.garden.reproduction.deutscher_reid.arms import silhouette
-from studio.garden.reproduction.open_questions import error_split, likelihood_scale, tempered_people
+from studio.garden.reproduction.open_questions import likelihood_scale, tempered_people
 from studio.garden.reproduction.open_questions import sampled_posterior as sampled
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.kept_trials import plain
@@ -163,28 +163,3 @@ def test_a_scale_is_measured_on_a_person() -> None:
     assert np.shape(measured["shares"])[0] == 2
     parts = list(likelihood_scale.shown([Outcome(trial, measured) for trial in trials]))
     assert len(parts) == 7
-
-
-def test_parts_add_up_and_a_pose_that_outweighs_the_reference_leaves_nothing_to_the_search() -> None:
-    reference = {"frames": [0, 6], "laid": [2.0, 3.0], "errors": [10.0, 12.0], "weights": [-1.0, -1.0]}
-    tracked = {"frames": [0, 6], "errors": [30.0, 14.0], "weights": [-2.0, -0.5]}
-    parts = error_split.parts_of(tracked, reference)
-    assert parts == {"body": 2.5, "likelihood": (8.0 + 11.0) / 2, "search": 10.0}
-    assert sum(parts.values()) == pytest.approx(22.0)
-
-
-@pytest.mark.slow
-def test_a_tracker_is_measured_beside_long_climbs() -> None:
-    cache, scale = FootageCache(SAMPLES), Scale((0,), quick=True)
-    trials = error_split.trials(scale)
-    outcomes = []
-    for trial in (trials[0], *(one for one in trials if one.label.startswith("annealed"))):
-        own = {**trial.arguments, "last": 7} | ({"steps": 20} if "clip" in trial.arguments else {})
-        outcomes.append(Outcome(trial, json.loads(json.dumps(plain(error_split.measure(own, cache))))))
-    cache.close()
-    reference = outcomes[0].measured
-    assert all(laid < best for laid, best in zip(reference["laid"], reference["errors"], strict=True))
-    parts = list(error_split.shown(outcomes))
-    (chart,) = [part for part in parts if hasattr(part, "stacked")]
-    assert chart.stacked
-    assert [series.name for series in chart.series] == list(error_split.PARTS)

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -175,3 +176,32 @@ def test_the_improved_filter_keeps_every_limb_on_the_bundled_walk() -> None:
     assert sum(seed.lost_frames == 0 for seed in improved.seeds) >= 8
     assert improved.mean_mm < min(planned.mean_mm, baseline.mean_mm)
     assert all(math.isfinite(pair.seeds.p) for pair in comparison.pairs)
+
+
+def test_whose_fault_errors_are_is_a_bar_a_tracker_a_sentence_and_in_the_json() -> None:
+    drawn = replace(plan("annealed", "condensation"), split_frames=2)
+    assert {trial.arguments["split_frames"] for trial in trials(drawn)} == {2}
+    outcomes = [
+        replace(
+            one, measured={**one.measured, "parts_mm": {"search": -1.0 - at, "likelihood": 9.0, "body": 3.0}}
+        )
+        for at, one in enumerate(made_up(drawn))
+    ]
+    comparison = conclude(drawn, outcomes)
+    chart = findings(comparison).charts[2]
+    assert chart.stacked
+    assert chart.categories == ("annealed", "condensation")
+    assert [(one.name, one.y) for one in chart.series] == [
+        ("body", (3.0, 3.0)), ("likelihood", (9.0, 9.0)), ("search", (-3.0, -4.0)),
+    ]  # fmt: skip
+    assert "in 2 frames of each trial: annealed search −3.0, likelihood 9.0, body 3.0; condens" in table_text(
+        comparison
+    )
+    first = document(comparison)["trackers"][0]
+    assert first["parts_mm"] == {"search": -3.0, "likelihood": 9.0, "body": 3.0}
+
+
+def test_a_comparison_that_splits_nothing_has_no_bars_of_it(concluded: Comparison) -> None:
+    assert len(findings(concluded).charts) == 2
+    assert "Whose part" not in table_text(concluded)
+    assert "parts_mm" not in document(concluded)["trackers"][0]

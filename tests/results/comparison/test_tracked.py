@@ -153,3 +153,27 @@ def test_the_cache_drops_the_oldest_evidence_first() -> None:
             assert one.picture.size == 0
     finally:
         cache.close()
+
+
+def test_the_parts_of_an_error_add_up_and_leave_the_poses_as_they_are(cache) -> None:
+    usual, split = track(attempt(), cache), track(attempt(split_frames=4), cache)
+    assert (split.per_frame_mm, usual.parts_mm) == (usual.per_frame_mm, {})
+    assert sum(split.parts_mm.values()) == pytest.approx(split.mean_mm, abs=0.01)
+    assert split.parts_mm == track(attempt(split_frames=4), cache).parts_mm
+
+
+def test_too_few_particles_are_the_searchs_fault_and_wrong_bones_the_bodys(cache) -> None:
+    few = track(
+        attempt(changes={"layers": 1, "particles": 5}, last=2, sigma_scale=4.0, split_frames=1), cache
+    )
+    assert max(few.parts_mm, key=few.parts_mm.get) == "search"
+    bones = track(attempt(larger=0.15, last=2, split_frames=1), cache)
+    assert bones.parts_mm["body"] > 20.0
+    assert track(attempt(last=2, split_frames=1), cache).parts_mm["body"] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("count", "expected"), [(0, []), (1, [15]), (2, [13, 17]), (9, [11, 13, 15, 17, 19])]
+)
+def test_frames_in_the_middle_of_even_stretches(count, expected) -> None:
+    assert tracked.middles(range(11, 21, 2), count) == expected

@@ -27,18 +27,20 @@ from studio.garden.reproduction.claims import geometric_mean, share
 from studio.garden.reproduction.deutscher_reid.arms import TemplateArm, silhouette, template_arm
 from studio.garden.reproduction.experiment import Part, group_of, listed
 from studio.garden.reproduction.open_questions.posterior import LEVELS, band, distribution, rank
-from studio.garden.reproduction.open_questions.searched_clip import SearchedClip
 from studio.results.comparison.findings import Chart, Series, Table
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.statistics import number
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
+from studio.runs.live.following import Following
+from studio.runs.search_space import search_space, session_sigma
+from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.problem import FrameLikelihood
-from studio.search.settings import DEFAULT_WEIGHTING, default_settings
+from studio.search.settings import DEFAULT_WEIGHTING, RunSettings, default_settings
 from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.search.trackers.frame_loop import search_frame
 from studio.search.trackers.frame_prior import FramePrior
 from studio.search.trackers.random_numbers import RandomNumbers
-from studio.search.trackers.tracker import FilterState, LayerRecord
+from studio.search.trackers.tracker import FilterState, LayerRecord, start_of
 
 ARM_BODIES = ("planar_arm4", "branched_arms6")
 TURNED = 0.3
@@ -195,6 +197,34 @@ def people_trials(scale: Scale) -> tuple[Trial, ...]:
         for frame in (QUICK_FRAMES if scale.quick else AT_FRAMES)
         for seed in scale.seeds
     )
+
+
+class SearchedClip:
+    """A clip with what a search of its frames needs, in memory. settings : of a tracker with the default likelihood."""
+
+    def __init__(self, cache: FootageCache, clip: str, settings: RunSettings) -> None:
+        self.cache, self.settings = cache, settings
+        self.session = cache.session(clip)
+        self.body, self.cameras = self.session.body(), self.session.cameras()
+        sigma = session_sigma(self.session, self.body, self.session.manifest.fps)
+        self.space = search_space(self.body, sigma)
+        self.likelihood = WEIGHTINGS[DEFAULT_WEIGHTING].prepare(self.body, self.cameras, settings.weighting)
+
+    def problem(self, frame: int) -> FrameLikelihood:
+        """The likelihood of a frame."""
+        chosen, knobs = WEIGHTINGS[DEFAULT_WEIGHTING], self.settings.evidence
+        return self.likelihood.problem(
+            self.cache.evidence(
+                self.session, self.cameras, frame, knobs, chosen.edge_kind, chosen.reads_pictures
+            )
+        )
+
+    def followed(self, seed: int) -> Following:
+        """A run that begins in the session's start pose."""
+        start = self.session.start_pose(self.body)
+        return Following(
+            self.settings, self.space, start_of(None if start is None else tuple(map(float, start))), seed
+        )
 
 
 @kept_as("open_questions.sampled_posterior.measure_people")
