@@ -14,7 +14,8 @@ GROUPS = "\n".join(f"  {name}: {', '.join(members)}" for name, members in LINEUP
 EPILOG = f"""\b
 A tracker may take part several times, each with a label of your own and a change:
   --trackers annealed,annealed:few --set annealed:few.layers=4
---set NAME.KNOB=VALUE changes the one of that name (KNOB may be weighting), --set KNOB=VALUE all that have the knob.
+--set NAME.KNOB=VALUE changes the one of that name (KNOB may be weighting or body),
+--set KNOB=VALUE all that have the knob.
 \b
 Labels that bring their knobs:
 {LABELS}

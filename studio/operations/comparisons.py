@@ -16,7 +16,7 @@ from studio.foundations.knobs import Value
 from studio.operations.comparison_folders import kept_comparisons, runs_of, throw_away
 from studio.operations.jobs.comparison_run import ComparisonState, done_before
 from studio.operations.trial_runs import TrialLine, trial_lines
-from studio.results.comparison.candidates import LINEUPS, VARIANTS, WEIGHTING
+from studio.results.comparison.candidates import LINEUPS, VARIANTS
 from studio.results.comparison.kept_comparison import RESULT_NAME, KeptComparison
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.catalogue import TRACKERS
@@ -199,7 +199,7 @@ def comparison_detail(
         fit_shape=plan.fit_shape,
         split_frames=plan.split_frames,
         fps=plan.fps,
-        settings={one.name: {WEIGHTING: one.weighting, **one.changes} for one in plan.candidates},
+        settings={one.name: one.chosen for one in plan.candidates},
         result=kept.result(),
         trials=trial_lines(session, kept),
     )

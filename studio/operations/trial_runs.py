@@ -85,16 +85,16 @@ def run_of_trial(session: Session, kept: KeptComparison, tracker: str, seed: int
 def _make_run(
     session: Session, kept: KeptComparison, plan: Plan, candidate: Candidate, seed: int, note: str
 ) -> StoredRun:
-    settings = candidate.settings()
+    settings, body = candidate.settings(), candidate.body or plan.body
     guided = bool(plan.behaviour_path) and needs_model(candidate.tracker, settings.tracker)
     wanted = f"{kept.name}-{candidate.name.replace(':', '-')}-{seed}"[-LONGEST_NAME:].lstrip("-_")
     return prepare_run(
         session,
         tracker=candidate.tracker,
         weighting=candidate.weighting,
-        body=plan.body,
+        body=body,
         behaviour=plan.behaviour_path if guided else "",
-        start_pose=start_of_trial(session, plan.body, plan.first),
+        start_pose=start_of_trial(session, body, plan.first),
         first=plan.first,
         last=plan.last,
         seed=seed,

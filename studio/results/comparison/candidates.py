@@ -16,7 +16,8 @@ from studio.search.trackers.catalogue import TRACKERS, knobs_for_evaluations
 from studio.search.trackers.swarm_settings import PARTITIONS
 
 LABEL = re.compile(r"[A-Za-z0-9_-]{1,40}")
-WEIGHTING = "weighting"
+WEIGHTING, BODY = "weighting", "body"
+"""What counts as a knob of a candidate beside its settings."""
 DEFAULT_LAYERS = 10
 # Allowed deviation from the requested evaluations, as a share: rounding, not an advantage.
 UNEQUAL_SHARE = 0.01
@@ -39,7 +40,7 @@ LINEUPS: dict[str, tuple[str, ...]] = {
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """A tracker in a comparison. name : unique in it. changes : knobs by flat name, those of the evaluations
-    included. evaluations : poses weighed in a frame.
+    included. evaluations : poses weighed in a frame. body : a name, "" for the comparison's.
     """
 
     name: str
@@ -47,6 +48,12 @@ class Candidate:
     weighting: str
     evaluations: int
     changes: Mapping[str, Value]
+    body: str = ""
+
+    @property
+    def chosen(self) -> dict[str, Value]:
+        """What it differs by from others, as `--set` takes it."""
+        return {WEIGHTING: self.weighting, **({BODY: self.body} if self.body else {}), **self.changes}
 
     def settings(self) -> RunSettings:
         """All knobs of its run."""
@@ -59,7 +66,7 @@ class Lineup:
 
     names : trackers, tracker:label, or names of LINEUPS. weighting : of all. evaluations : a frame. layers : of
     annealed trackers without their own. changes : by name, knobs by flat name; under "" those of all trackers that
-    have them; `weighting` counts as a knob.
+    have them; of one, `weighting` and `body` count as knobs.
     """
 
     names: tuple[str, ...]
@@ -105,10 +112,10 @@ def expanded(names: Sequence[str]) -> tuple[str, ...]:
 def _candidate(name: str, lineup: Lineup) -> Candidate:
     tracker = name.partition(":")[0]
     own = dict(lineup.changes.get(name, {}))
-    weighting = str(own.pop(WEIGHTING, lineup.weighting))
+    weighting, body = str(own.pop(WEIGHTING, lineup.weighting)), str(own.pop(BODY, ""))
     settings = default_settings(tracker, weighting)
     shared = {knob: value for knob, value in lineup.changes.get("", {}).items() if knob in values(settings)}
-    if ":" in name and name not in VARIANTS and not (own or weighting != lineup.weighting):
+    if ":" in name and name not in VARIANTS and not (own or body or weighting != lineup.weighting):
         known = ", ".join(entry for entry in VARIANTS if entry.startswith(f"{tracker}:")) or "none"
         raise SettingsError(
             f"'{name}' does not differ from '{tracker}'.",
@@ -133,17 +140,18 @@ def _candidate(name: str, lineup: Lineup) -> Candidate:
             f"Leave {', '.join(equal)} as they follow from the evaluations, or change them together.",
         )
     chosen = values(changed)
-    return Candidate(name, tracker, weighting, total, {knob: chosen[knob] for knob in {**equal, **requested}})
+    changes = {knob: chosen[knob] for knob in {**equal, **requested}}
+    return Candidate(name, tracker, weighting, total, changes, body)
 
 
 def _check_shared(shared: Mapping[str, Value], names: Sequence[str], weighting: str) -> None:
     """Raise SettingsError for a knob that no candidate has."""
     known = {knob for name in names for knob in values(default_settings(name.partition(":")[0], weighting))}
     for knob in shared:
-        if knob == WEIGHTING:
+        if knob in (WEIGHTING, BODY):
             raise SettingsError(
-                "The weighting of all trackers is not a knob.",
-                "Choose it with --weighting, or for one tracker by its name.",
+                f"The {knob} of all trackers is not a knob.",
+                f"Choose it with --{knob}, or for one tracker by its name.",
             )
         if knob not in known:
             raise SettingsError(

@@ -96,10 +96,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "evaluations": plan.evaluations,
         "seeds": list(plan.seeds),
         "trackers": [_plain_tracker(result, plan.seeds) for result in comparison.trackers],
-        "settings": {
-            candidate.name: {"weighting": candidate.weighting, **dict(candidate.changes)}
-            for candidate in plan.candidates
-        },
+        "settings": {candidate.name: candidate.chosen for candidate in plan.candidates},
         "sign_tests": [
             {
                 "first": pair.first,
@@ -252,7 +249,11 @@ def _settings(comparison: Comparison) -> dict[str, Any]:
     for candidate in plan.candidates:
         defaults = values(candidate.settings())
         listed[candidate.name] = ", ".join(
-            [candidate.weighting, *(f"{knob} {defaults[knob]}" for knob in candidate.changes)]
+            [
+                candidate.weighting,
+                *([f"body {candidate.body}"] if candidate.body else []),
+                *(f"{knob} {defaults[knob]}" for knob in candidate.changes),
+            ]
         )
     return listed
 

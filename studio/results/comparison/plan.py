@@ -166,10 +166,11 @@ def plan_comparison(
     weighting = WEIGHTINGS[lineup.weighting or session.manifest.weighting or DEFAULT_WEIGHTING].name
     check_seeds(seeds)
     begin, end = session.checked_frames(first, last)
-    model = session.body(body or None)
-    start_of(session, model, None)
     taking_part = candidates(replace(lineup, weighting=weighting))
-    chosen = _chosen_model(session, model, taking_part, behaviour)
+    bodies = {one.name: session.body(one.body or body or None) for one in taking_part}
+    for own in bodies.values():
+        start_of(session, own, None)
+    chosen = _chosen_model(session, bodies, taking_part, behaviour)
     plan = plan_of(session, taking_part, lineup.evaluations, seeds, (begin, end), body, chosen)
     return replace(plan, split_frames=split_frames)
 
@@ -242,13 +243,18 @@ def conclude(plan: Plan, outcomes: Sequence[Outcome]) -> Comparison:
 
 
 def _chosen_model(
-    session: Session, body: BodyModel, taking_part: Sequence[Candidate], behaviour: str
+    session: Session, bodies: Mapping[str, BodyModel], taking_part: Sequence[Candidate], behaviour: str
 ) -> ChosenModel | None:
-    """The model for all candidates that need one; None where none does. Raises BehaviourError, NotFoundError."""
+    """The model for all candidates that need one; None where none does. bodies : by candidate.
+
+    Raises BehaviourError, NotFoundError.
+    """
+    chosen = None
     for candidate in taking_part:
         if needs_model(candidate.tracker, candidate.settings().tracker):
-            return chosen_model(session, body, candidate.settings(), behaviour)
-    return None
+            wanted = behaviour if chosen is None else str(chosen.path)
+            chosen = chosen_model(session, bodies[candidate.name], candidate.settings(), wanted)
+    return chosen
 
 
 def tracking_trial_of(plan: Plan, candidate: Candidate, seed: int) -> TrackingTrial:
@@ -261,7 +267,7 @@ def tracking_trial_of(plan: Plan, candidate: Candidate, seed: int) -> TrackingTr
         {"refine_frames": FrameRefinementSettings().refine_frames, **candidate.changes},
         plan.first,
         plan.last,
-        body=plan.body,
+        body=candidate.body or plan.body,
         behaviour=plan.behaviour_path if guided else "",
         split_frames=plan.split_frames,
     )

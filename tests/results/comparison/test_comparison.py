@@ -205,3 +205,20 @@ def test_a_comparison_that_splits_nothing_has_no_bars_of_it(concluded: Compariso
     assert len(findings(concluded).charts) == 2
     assert "Whose part" not in table_text(concluded)
     assert "parts_mm" not in document(concluded)["trackers"][0]
+
+
+def test_one_candidate_has_another_body_than_the_comparison() -> None:
+    lineup = Lineup(("tempered", "tempered:new"), "", 200, 5, {"tempered:new": {"body": "human34"}})
+    drawn = plan_comparison(Session(WALK), lineup, (0,), last=2)
+    assert [trial.arguments["body"] for trial in trials(drawn)] == ["", "human34"]
+    comparison = conclude(drawn, made_up(drawn))
+    assert document(comparison)["settings"]["tempered:new"]["body"] == "human34"
+    assert "body human34" in findings(comparison).settings["tempered:new"]
+    assert "body" not in document(comparison)["settings"]["tempered"]
+
+
+@pytest.mark.parametrize("body", ["", "tempered:new"])
+def test_a_body_that_does_not_exist_and_one_for_all_are_refused(body: str) -> None:
+    lineup = Lineup(("tempered", "tempered:new"), "", 200, 5, {body: {"body": "no-such"}})
+    with pytest.raises(StudioError, match="no-such|The body of all trackers is not a knob"):
+        plan_comparison(Session(WALK), lineup, (0,), last=2)
