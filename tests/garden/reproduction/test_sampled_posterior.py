@@ -118,13 +118,21 @@ def test_the_experiments_on_people_pair_their_lines() -> None:
     known = {"frames": [0], "per_frame_mm": [1.0], "lost": [[]], "mean_mm": 10.0, "worst_mm": 10.0}
     known |= {"lost_frames": 0, "lost_limbs": [], "evaluations": 5, "seconds": 1.0}
     outcomes = [
-        Outcome(trial, {**known, "log_evidence": -9.0 if "larger" in trial.arguments else -5.0})
+        Outcome(
+            trial,
+            {**known, "log_evidence": -9.0 if "larger" in trial.arguments else -5.0}
+            | {
+                "mean_mm": 8.0
+                if "larger" in trial.arguments and "walk" in trial.label
+                else 10.0 + trial.arguments.get("larger", 0.0)
+            },
+        )
         for trial in bodies
     ]
-    (share, *_) = [
+    share, agrees = [
         part for part in tempered_people.EXPERIMENTS[1].shown(outcomes) if hasattr(part, "verdict")
     ]
-    assert share.ours == 100.0
+    assert (share.ours, agrees.ours) == (100.0, 50.0)
     tempered = [
         Outcome(trial, {**known, "mean_mm": 12.0 if trial.arguments["tracker"] == "tempered" else 10.0})
         for trial in errors

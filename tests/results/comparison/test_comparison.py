@@ -220,5 +220,5 @@ def test_one_candidate_has_another_body_than_the_comparison() -> None:
 @pytest.mark.parametrize("body", ["", "tempered:new"])
 def test_a_body_that_does_not_exist_and_one_for_all_are_refused(body: str) -> None:
     lineup = Lineup(("tempered", "tempered:new"), "", 200, 5, {body: {"body": "no-such"}})
-    with pytest.raises(StudioError, match="no-such|The body of all trackers is not a knob"):
+    with pytest.raises(StudioError, match=r"no-such|The body of all trackers is not a knob"):
         plan_comparison(Session(WALK), lineup, (0,), last=2)

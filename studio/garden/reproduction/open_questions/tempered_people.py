@@ -68,18 +68,24 @@ def _body_lines(quick: bool) -> Iterator[Line]:
 
 
 def _bodies_shown(groups: dict[str, list[Tracked]]) -> Iterable[Part]:
-    """In how many clips the true body has more evidence, mean over the seeds."""
-    rows, ahead = list[tuple[Plain, ...]](), list[bool]()
+    """In how many clips the true body has more evidence, mean over the seeds; whether it has the smaller error, too."""
+    rows, ahead, agree = list[tuple[Plain, ...]](), list[bool](), list[bool]()
     for kind in KINDS:
         pair = [groups.get(f"{name}, {kind}", []) for name in (TRUE, LARGE)]
         if not all(pair):
             continue
         known = [[run.log_evidence or 0.0 for run in runs] for runs in pair]
+        errors = [float(np.mean(mean_errors(runs))) for runs in pair]
         gains = [one - other for one, other in zip(*known, strict=True)]
         ahead.append(float(np.mean(gains)) > 0.0)
-        rows.append((kind, *(round(float(np.mean(one)), 2) for one in (*known, gains))))
+        agree.append(ahead[-1] == (errors[0] < errors[1]))
+        means = (round(float(np.mean(one)), 2) for one in (*known, gains))
+        rows.append((kind, *means, *(round(one, 1) for one in errors)))
     yield percent("clips in which the true body has more evidence", ahead, 50.0)
-    heads = ("clip", "true body (nats a frame)", "10 % larger", "difference")
+    yield percent("clips in which the body with more evidence is nearer to the truth", agree, 50.0)
+    heads = (
+        "clip", "true body (nats a frame)", "10 % larger", "difference", "true body (mm)", "10 % larger (mm)"
+    )  # fmt: skip
     yield Table("Each clip", heads, tuple(rows))
     yield {"evaluations": EVALUATIONS, "frames": EVIDENCE_FRAMES, "weighting": WEIGHTING}
 
