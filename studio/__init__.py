@@ -5,7 +5,7 @@ For scripts and notebooks, the verbs of the command line as functions: `import s
 use, so that `import studio` costs nothing. `studio.arena` has the arena's.
 """
 
-import importlib
+from studio.foundations.first_use import on_first_use
 
 _VERBS = {
     "studio.cli.diagnostics_archive": ("diagnostics",),
@@ -64,23 +64,4 @@ _VERBS = {
     ),
     "studio.cli.self_check": ("doctor",),
 }
-ARENA = "arena"
-_MODULE_OF = {name: module for module, names in _VERBS.items() for name in names}
-
-
-def __getattr__(name: str) -> object:
-    """A verb, or the arena, imported on first use."""
-    if name == ARENA:
-        return importlib.import_module(f"studio.{ARENA}")
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module 'studio' has no attribute '{name}'")
-    verb = getattr(importlib.import_module(_MODULE_OF[name]), name)
-    if declared := getattr(verb, "__operation__", None):
-        verb.__doc__, verb.__signature__ = declared.help, declared.signature
-    globals()[name] = verb
-    return verb
-
-
-def __dir__() -> list[str]:
-    """The verbs, and the arena."""
-    return sorted((*_MODULE_OF, ARENA))
+__getattr__, __dir__ = on_first_use(__name__, _VERBS, ("arena",))

@@ -1,10 +1,10 @@
 """What adding your own takes: everything that a tracker, a likelihood, an export or a calibration format is made of.
 
-Each name is imported on first use, like the verbs of `studio`. The guide's page *Adding your own* uses most of
-them.
+Each name is imported on first use, like the verbs of `studio`: a package may be loaded while the studio's own
+catalogues are. The guide's page *Adding your own* uses most of them.
 """
 
-import importlib
+from studio.foundations.first_use import on_first_use
 
 _NAMES = {
     "studio.body.forward_kinematics": ("joint_frames", "limb_ends", "marker_points"),
@@ -47,17 +47,4 @@ _NAMES = {
         "Tracker",
     ),
 }
-_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
-
-
-def __getattr__(name: str) -> object:
-    """A name, imported on first use: a package may be loaded while the studio's own catalogues are."""
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module 'studio.extending' has no attribute '{name}'")
-    value = getattr(importlib.import_module(_MODULE_OF[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(_MODULE_OF)
+__getattr__, __dir__ = on_first_use(__name__, _NAMES)
