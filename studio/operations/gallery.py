@@ -17,7 +17,7 @@ from studio.results.drawing_footage.real_data import missing_data, real_footage
 from studio.results.drawing_footage.recipe_file import find_recipe
 from studio.results.drawing_footage.recipes import synthesize
 from studio.sessions.atomic_files import discard
-from studio.sessions.importers.importing import add_footage
+from studio.sessions.importers.importing import ImportOptions, Unit, add_footage
 from studio.sessions.manifest import FILE_NAME
 from studio.sessions.samples import install_prepared_runs, install_sample, sample_folder
 from studio.sessions.session import Session, thumbnail_of
@@ -34,6 +34,7 @@ class Card:
     kind : "sample" is shipped with the studio; "recipe" is rendered; "elsewhere": its footage cannot be shipped.
     data : where footage or motion that is not shipped comes from.
     footage : where a copy of it lies in the folder of the real data, from which it is imported.
+    unit, fps : of that footage, where it does not say; as of an import.
     commands : that make the session from it.
     guide : page of the guide on it.
     """
@@ -45,10 +46,16 @@ class Card:
     recipe: str = ""
     data: str = ""
     footage: str = ""
+    unit: Unit = ""
+    fps: float | None = None
     commands: tuple[str, ...] = ()
     guide: str = ""
 
 
+CYLINDER = (
+    "github.com/spoonsso/dannce (MIT), dannce/demo/mouse_cylinder in its history of 2019: videos, plates, calibration,"
+    " points labelled by hand."
+)
 CMU = (
     "Recorded motion of the CMU Graphics Lab Motion Capture Database, in cmu-motion/ of the folder that"
     " STUDIO_REAL_DATA names."
@@ -112,6 +119,66 @@ CARDS = (
             "studio initialise mouse",
         ),
         guide="/guide/animal",
+    ),
+    Card(
+        "rearing",
+        "A mouse that rears",
+        "In a glass cylinder, three cameras, 330 frames: it walks, stands up, and is reflected by the glass.",
+        "elsewhere",
+        data=CYLINDER,
+        footage="mouse-cylinder/three-a",
+        commands=(
+            "studio import three-a --into rearing",
+            "studio subject rearing --body mouse31",
+            "studio background rearing --source animal --plates three-a/background",
+            "studio initialise rearing --frame 6",
+        ),
+        guide="/guide/animal",
+    ),
+    Card(
+        "cylinder",
+        "The same mouse, five cameras",
+        "Two seconds of walking. Nobody labelled it: overlays and silhouettes are the judges.",
+        "elsewhere",
+        data=CYLINDER,
+        footage="mouse-cylinder/five",
+        commands=(
+            "studio import five --into cylinder",
+            "studio subject cylinder --body mouse31",
+            "studio background cylinder --source animal --plates five/background",
+            "studio initialise cylinder",
+        ),
+        guide="/guide/animal",
+    ),
+    Card(
+        "med7",
+        "A robot's arm",
+        "A stereo pair of 120 mm, five still poses, each found from nothing by its meshes; the encoders are known.",
+        "elsewhere",
+        data="github.com/lbr-stack/roboreg (Apache-2.0), test/data/lbr_med7 in its history: pictures, masks, meshes.",
+        footage="robot-lbr-med7",
+        unit="mm",
+        fps=1.0,
+        commands=(
+            "studio import robot-lbr-med7 --unit mm --fps 1 --into med7",
+            "studio subject med7 --body robot-lbr-med7/model/lbr_med7.urdf",
+            "studio initialise med7",
+        ),
+        guide="/guide/adding#a-robot",
+    ),
+    Card(
+        "wood",
+        "A person drawn by others",
+        "Clothes that are not ours, a floor of skin's colour, exact truth.",
+        "elsewhere",
+        data="Drawn by another program than the studio's: drawn-elsewhere/wood.",
+        footage="drawn-elsewhere/wood",
+        commands=(
+            "studio import wood --into wood",
+            "studio track wood --start-pose wood/truth/truth.trc",
+            "studio evaluate wood run-1 --truth wood/truth/truth.trc",
+        ),
+        guide="/guide/figures",
     ),
     Card(
         "balance",
@@ -310,7 +377,8 @@ def _imported(card: Card, place: Path, progress: Progress) -> Session:
         )
     session = begin_session(place, card.title)
     try:
-        return add_footage(session, source, progress=progress).session
+        options = ImportOptions(unit=card.unit, fps=card.fps)
+        return add_footage(session, source, options, progress=progress).session
     except BaseException:
         discard(place)
         raise

@@ -3,6 +3,7 @@
 import dataclasses
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from small_recipes import small
@@ -108,6 +109,31 @@ def test_footage_that_is_not_shipped_is_imported_where_there_is_a_copy(
     assert studio.ended("/api/gallery/mouse")["state"] == "done"
     assert card(studio, "mouse")["there"] is True
     assert studio.get("/api/sessions/mouse")["frame_count"] == 4
+
+
+def test_pictures_that_do_not_say_their_rate_have_the_cards(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("STUDIO_REAL_DATA", str(tmp_path))
+    for name in ("left", "right"):
+        folder = tmp_path / "robot-lbr-med7" / "pictures" / name
+        folder.mkdir(parents=True)
+        for number in range(2):
+            cv2.imwrite(str(folder / f"{number:04d}.jpg"), np.full((48, 64, 3), 90 + number, np.uint8))
+    studio.post("/api/gallery/med7")
+    assert studio.ended("/api/gallery/med7")["state"] == "done"
+    assert studio.get("/api/sessions/med7")["fps"] == 1.0
+
+
+@pytest.mark.real_data
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [one.name for one in CARDS if one.kind == "elsewhere"])
+def test_footage_of_others_is_imported_as_it_lies(real_data: Path, studio: Studio, name: str) -> None:
+    if card(studio, name)["missing"]:
+        pytest.skip(f"the footage of {name} is not here")
+    studio.post(f"/api/gallery/{name}")
+    assert studio.ended(f"/api/gallery/{name}")["state"] == "done"
+    assert studio.get(f"/api/sessions/{name}")["frame_count"] > 1
 
 
 def test_what_cannot_be_made_says_why(
