@@ -183,7 +183,7 @@ def split_error(
         int, Field(ge=1000, le=10_000_000, description="Poses that each climb of a frame weighs.")
     ] = EVALUATIONS,
     again: Annotated[
-        bool, Field(description="Also search frames whose long search is kept, as after a change of masks.")
+        bool, Field(description="Also search frames whose long search is kept, as after a change of knobs.")
     ] = False,
     progress: Reporting = None,
 ) -> ErrorSplit:

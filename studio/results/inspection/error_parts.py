@@ -28,7 +28,7 @@ import numpy as np
 from studio.foundations.arrays import Array
 from studio.foundations.words import counted
 from studio.results.inspection.likelihoods import telling_nats
-from studio.results.inspection.long_search import LongSearch, kept_searches, points_apart, search_of
+from studio.results.inspection.long_search import LongSearch, points_apart, search_of, searches_that_hold
 from studio.results.inspection.reading import InspectedFrame, InspectedRun
 from studio.results.inspection.reference import body_points, true_pose
 
@@ -141,7 +141,7 @@ def _largest(parts: Sequence[float]) -> str:
 
 def split_of(run: InspectedRun) -> ErrorSplit:
     """Whose fault the errors are, over the frames of a run that were searched for long."""
-    kept = kept_searches(run.run)
+    kept = searches_that_hold(run)
     parts: list[ErrorParts] = []
     if kept:
         with run.run.results() as results:

@@ -22,6 +22,7 @@ from studio.results.inspection.likelihoods import evaluation_of
 from studio.results.inspection.reading import InspectedFrame, InspectedRun
 from studio.results.inspection.reference import body_points, refined_pose, true_points, true_pose
 from studio.results.inspection.retracking import Change, Retracking, more_evaluations
+from studio.sessions.provenance import digests
 from studio.sessions.record_files import RecordFile
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.work_under_way import one_at_a_time
@@ -50,6 +51,7 @@ class LongSearch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         and of the heaviest.
     origin : the pose from which the heaviest was climbed to.
     pose : (D,) the heaviest.
+    masks : digest of what masks were made of; "" where it was not kept.
     """
 
     frame: int
@@ -60,6 +62,7 @@ class LongSearch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     best: float
     origin: str
     pose: tuple[float, ...]
+    masks: str = ""
 
 
 class _Searches(msgspec.Struct, frozen=True):
@@ -78,6 +81,12 @@ _RECORD = RecordFile(
 def kept_searches(run: StoredRun) -> dict[int, LongSearch]:
     """A run's long searches by frame, also of frames that were tracked again since. Raises SessionError."""
     return {one.frame: one for one in _RECORD.read(_path(run), _Searches()).searches}
+
+
+def searches_that_hold(run: InspectedRun) -> dict[int, LongSearch]:
+    """The kept ones by frame, without those before other masks. Raises SessionError."""
+    masks = _masks_of(run)
+    return {frame: one for frame, one in kept_searches(run.run).items() if one.masks in ("", masks)}
 
 
 def search_of(frame: InspectedFrame, kept: dict[int, LongSearch]) -> LongSearch | None:
@@ -105,7 +114,7 @@ def search_frames(
 
     Each is kept as soon as it is done. Raises NotFoundError for a frame that is not finished.
     """
-    kept, wanted = kept_searches(run.run), list[int]()
+    kept, wanted = searches_that_hold(run), list[int]()
     for number in frames:
         known = search_of(run.frame(number), kept)
         is_kept = known is not None and known.evaluations >= evaluations
@@ -146,7 +155,7 @@ def search_long(
     found = frame.searched()
     best, weight, origin = found, float(evaluation.log_weights(found[None])[0]), FOUND
     own = None if truth is None else float(evaluation.log_weights(truth.pose[None])[0])
-    search = LongSearch(number, _stamp(frame), evaluations, weight, own, weight, origin, ())
+    search = LongSearch(number, _stamp(frame), evaluations, weight, own, weight, origin, (), _masks_of(run))
     steps = max(FEWEST_STEPS, evaluations // SET)
     for at, (kind, start) in enumerate(starts):
         scale = FIRST_STEP_MM * scale_of(run.body) * parameters_a_mm(run.body, start)
@@ -250,6 +259,10 @@ def climb(
         length *= float(np.exp(path_rate / damping * (far / usual - 1.0)))
     step(steps)
     return best, weight
+
+
+def _masks_of(run: InspectedRun) -> str:
+    return digests(run.session, ("masks",))["masks"]
 
 
 def _stamp(frame: InspectedFrame) -> tuple[float, float]:

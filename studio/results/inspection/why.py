@@ -45,7 +45,7 @@ from studio.results.inspection.camera_checks import CameraFault, fault_of, view_
 from studio.results.inspection.error_parts import parts_of, split_of, words_of
 from studio.results.inspection.likelihoods import FrameEvaluation, evaluation_of, telling_nats
 from studio.results.inspection.limbs import limb_rows, limb_shares, limbs_too_far
-from studio.results.inspection.long_search import LongSearch, kept_searches, search_of
+from studio.results.inspection.long_search import LongSearch, search_of, searches_that_hold
 from studio.results.inspection.modes import exchanged_in
 from studio.results.inspection.reading import InspectedFrame, InspectedRun, no_value
 from studio.results.inspection.reference import body_points, by_limb, refined_pose, true_points
@@ -490,7 +490,7 @@ def usual_survival(settings: RunSettings) -> dict[str, Value]:
 def rows(frame: InspectedFrame, selection: Selection) -> ViewResult:
     """The tables, findings and remedies of view `why`; kept for the frames that were asked for last."""
     track = selection.track if selection.track != RAW else ""
-    search = None if track else search_of(frame, kept_searches(frame.of.run))
+    search = None if track else search_of(frame, searches_that_hold(frame.of))
     key = (frame.of.run.folder, frame.number, track, search, *_stamps(frame))
     with _lock:
         if key in _known:

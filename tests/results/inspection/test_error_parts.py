@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from drawn_people import ring_of_cameras
@@ -13,6 +14,7 @@ from tracked_runs import finish
 import studio
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
+from studio.footage.capture.footage import EXCLUSIONS
 from studio.foundations.errors import NotFoundError, RunError, SessionError
 from studio.operations.inspecting import worst_frame
 from studio.results.evaluation.report import in_words
@@ -197,6 +199,18 @@ def test_a_search_of_a_frame_that_was_tracked_again_counts_no_more(own: Inspecte
     kept.write_text(kept.read_text().replace('"frame": 3', '"frame": 2'))
     assert split_of(own).frames == ()
     assert split_of(own).words.startswith("No frame has been searched for long")
+
+
+def test_a_search_before_other_masks_counts_no_more(own: InspectedRun) -> None:
+    split(own, FRAME)
+    areas = own.session.path / EXCLUSIONS
+    areas.mkdir()
+    area = np.zeros((48, 64), np.uint8)
+    area[:4] = 255
+    cv2.imwrite(str(areas / "cam1.png"), area)
+    assert split_of(own).frames == ()
+    (areas / "cam1.png").unlink()
+    assert [one.frame for one in split_of(own).frames] == [FRAME]
 
 
 def test_a_kept_pose_of_another_body_counts_not(own: InspectedRun) -> None:
