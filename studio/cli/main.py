@@ -4,11 +4,16 @@ import ast
 import functools
 import gc
 import importlib
+import os
 import re
 
 import click
 
 from studio.foundations.package import package_folder, software_version
+
+# Read when NumPy is loaded. Matrices are as small as a body has parameters: on busy cores threads of BLAS wait for one
+# another, 40 times as long as one thread needs.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # A command's module is imported when the command is called, so that no other waits for it: here is the module in this
 # room, and the function whose docstring says what the command does.

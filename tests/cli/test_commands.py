@@ -5,6 +5,8 @@ import errno
 import json
 import os
 import re
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -241,3 +243,15 @@ def test_too_little_memory_is_no_fault_of_the_studio(capsys: pytest.CaptureFixtu
     said = capsys.readouterr().err
     assert "not enough memory" in said
     assert "fault" not in said
+
+
+@pytest.mark.parametrize(("given", "expected"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_small_matrices_are_not_parted_among_threads(given: dict[str, str], expected: str) -> None:
+    ask = "import os, sys, studio.cli.main; print('numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])"
+    environment = {
+        name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"
+    } | given
+    done = subprocess.run(
+        [sys.executable, "-c", ask], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["False", expected]

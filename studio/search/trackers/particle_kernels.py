@@ -118,3 +118,17 @@ def root_of(correlations: Array) -> Array:
                 value -= root[i, k] * root[j, k]
             root[i, j] = value / root[j, j]
     return root
+
+
+@njit(**EXACT)
+def standardised(root: Array, rows: Array) -> Array:
+    """(N, D) what a root (D, D) of `root_of` makes rows (N, D) of; zero in directions without noise of their own."""
+    made = np.zeros_like(rows)
+    for n in range(len(rows)):
+        for i in range(len(root)):
+            if root[i, i] > 0.0:
+                value = rows[n, i]
+                for k in range(i):
+                    value -= root[i, k] * made[n, k]
+                made[n, i] = value / root[i, i]
+    return made

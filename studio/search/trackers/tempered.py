@@ -38,7 +38,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from studio.foundations.arrays import Array
@@ -49,7 +48,7 @@ from studio.search.trackers.crossover import limb_places
 from studio.search.trackers.diffusion import Spread
 from studio.search.trackers.frame_prior import FramePrior
 from studio.search.trackers.layer_record import layer_record
-from studio.search.trackers.particle_kernels import children, moments, root_of
+from studio.search.trackers.particle_kernels import children, moments, root_of, standardised
 from studio.search.trackers.particles import (
     ParticleFilter,
     checked_values,
@@ -323,7 +322,5 @@ def _log_normal(poses: Array, normal: Spread) -> Array:
     no part in it.
     """
     assert normal.root is not None
-    varied = np.flatnonzero(np.diag(normal.root) > 0.0)
-    away: Array = (poses - normal.centres[0])[:, varied] / normal.deviation[varied]
-    standard: Array = solve_triangular(normal.root[np.ix_(varied, varied)], away.T, lower=True)
-    return -0.5 * np.sum(standard**2, axis=0)
+    away: Array = (poses - normal.centres[0]) / np.where(normal.deviation > 0.0, normal.deviation, 1.0)
+    return -0.5 * np.sum(standardised(normal.root, away) ** 2, axis=1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studio.search.trackers.particle_kernels import children, drawn, moments
+from studio.search.trackers.particle_kernels import children, drawn, moments, root_of, standardised
 
 SHAPES = [(1, 3), (2, 2), (7, 1), (33, 40), (100, 31), (2000, 7)]
 
@@ -41,3 +41,14 @@ def test_children(limbs: list[int]) -> None:
     made, crossed = children(first, second, place, chosen, shares)
     assert np.array_equal(made, np.where(taken, second, first))
     assert np.array_equal(crossed, taken.any(axis=1))
+
+
+def test_what_a_root_makes_of_rows_is_undone_in_the_directions_that_vary() -> None:
+    rng = np.random.default_rng(2)
+    drawn = rng.normal(size=(40, 4))
+    drawn[:, 2] = 0.0
+    root = root_of(drawn.T @ drawn / 40.0)
+    standard = rng.normal(size=(6, 4))
+    standard[:, 2] = 0.0
+    np.testing.assert_allclose(standardised(root, standard @ root.T), standard, atol=1e-12)
+    assert not standardised(root, np.ones((3, 4)))[:, 2].any()
