@@ -5,11 +5,13 @@ from collections.abc import Iterable
 from types import MappingProxyType
 
 from studio.foundations.errors import NotFoundError
-from studio.garden.reproduction import fleischmann
+from studio.garden.reproduction import fleischmann, swarms
 from studio.garden.reproduction.caillette import (
     cluster_floor,
     clusters_and_states,
     dynamics,
+    hulls_and_blobs,
+    loss_test,
     models,
     scalability,
     table_1,
@@ -20,6 +22,7 @@ from studio.garden.reproduction.deutscher_reid import (
     localisation,
     particles_needed,
     processors,
+    rivals,
     tracked_people,
     weight_of_a_knee,
 )
@@ -51,11 +54,15 @@ MODULES = (
     carried_and_crossed,
     particles_needed,
     localisation,
+    rivals,
     processors,
     fleischmann,
+    swarms,
     clusters_and_states,
     cluster_floor,
     table_1,
+    hulls_and_blobs,
+    loss_test,
     dynamics,
     models,
     scalability,

@@ -13,7 +13,7 @@ from studio.foundations.arrays import Array
 from studio.garden.reproduction.claims import ratio, sign_tests
 from studio.garden.reproduction.drawing import seeds_and_mean, table_over
 from studio.garden.reproduction.experiment import Experiment, Part, grouped, listed
-from studio.results.comparison.findings import Chart, Number, Series, Table
+from studio.results.comparison.findings import FIRM_SEEDS, Chart, Number, Series, Table
 from studio.results.comparison.statistics import number
 from studio.results.comparison.tracked import Tracked, TrackingTrial, measure_tracking, tracking_trial
 from studio.results.comparison.trials import Outcome, Scale, Trial
@@ -44,7 +44,7 @@ class Line:
     """A line of an experiment's table of settings, tracked with every seed.
 
     evaluations : a frame, 0 where the candidate's knobs give them. wanted : other fields of `TrackingTrial`, by seed
-    where it is a function.
+    where it is a function. seeds : at least so many, where all ten are run.
     """
 
     name: str
@@ -52,6 +52,12 @@ class Line:
     footage: str
     evaluations: int = 0
     wanted: Mapping[str, Any] | Callable[[int], Mapping[str, Any]] = field(default_factory=dict[str, Any])
+    seeds: int = 0
+
+    def trials(self, scale: Scale) -> Iterator[Trial]:
+        """One a seed."""
+        more = scale.seeds if scale.quick or len(scale.seeds) < FIRM_SEEDS else tuple(range(self.seeds))
+        return map(self.trial, max(scale.seeds, more, key=len))
 
     def trial(self, seed: int) -> Trial:
         wanted = self.wanted(seed) if callable(self.wanted) else self.wanted
@@ -69,7 +75,7 @@ def tracked_experiment(
     """
 
     def trials(scale: Scale) -> tuple[Trial, ...]:
-        return tuple(line.trial(seed) for line in lines(scale.quick) for seed in scale.seeds)
+        return tuple(trial for line in lines(scale.quick) for trial in line.trials(scale))
 
     footage = tuple(dict.fromkeys(line.footage for line in lines(False)))
     return listed(name, trials, measure_tracking, lambda outcomes: shown(by_group(outcomes)), footage=footage)

@@ -145,7 +145,25 @@ def known_problems(
     return lambda frame: kept[frame]
 
 
-LATER = ("recovers", "covered")
+def taught_blobs(
+    problem_of: Callable[[int], FrameLikelihood], true_poses: Array, settings: RunSettings
+) -> Mapping[str, Array]:
+    """The memory with blobs learnt from true poses (F, D), of as many frames as a run learns from. Raises
+    SettingsError for a likelihood without blobs.
+    """
+    weighting = settings.weighting
+    memory: Mapping[str, Array] = {}
+    for frame, pose in enumerate(true_poses[: weighting.blob_learning]):
+        problem = problem_of(frame)
+        if not isinstance(problem, FittedToPoses):
+            raise SettingsError(
+                f"Weighting '{settings.weighting_name}' learns no blobs.", "Take one that fits blobs."
+            )
+        memory = cast("FittedToPoses", problem.expecting(pose[None], memory)).remembered(pose)
+    return memory
+
+
+LATER = ("recovers", "covered", "taught")
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +173,8 @@ class Follow:
     footage : a recipe's name. last : frames from the first, which begins at the true pose. changes : knobs by flat
     name. from_truth : blobs are fitted from the true pose in every frame. training : of the behaviour
     model, None without one. recovers : by the paper's own recovery (`Recovering`). covered : by occluded evidence
-    (`occluded`), with blobs fitted from the true pose.
+    (`occluded`), with blobs fitted from the true pose. taught : the run begins with blobs that were learnt from the
+    true poses of the first frames (`taught_blobs`).
     """
 
     footage: str
@@ -168,9 +187,10 @@ class Follow:
     training: Training | None = None
     recovers: bool = False
     covered: bool = False
+    taught: bool = False
 
     def plain(self) -> dict[str, Any]:
-        """As a trial's arguments; the last two are left out where they are not, so that stored outcomes stay valid."""
+        """As a trial's arguments; those of LATER only where they are, so that stored outcomes stay valid."""
         return {name: value for name, value in asdict(self).items() if value or name not in LATER}
 
     @classmethod
@@ -344,6 +364,9 @@ def run_of(
     problem_of = problems(cache, session, settings, wanted.last)
     if wanted.from_truth:
         problem_of = known_problems(cache, session, settings, truth.poses, wanted.covered)
+    start = start_of(tuple(float(value) for value in truth.poses[0]))
+    if wanted.taught:
+        start = dataclasses.replace(start, memory=taught_blobs(problem_of, truth.poses, settings))
     free: list[float] = []
 
     def note(record: LayerRecord) -> None:
@@ -354,7 +377,7 @@ def run_of(
     following = (Recovering if wanted.recovers else Following)(
         settings,
         search_space(body, session_sigma(session, body, fps), fitted),
-        start_of(tuple(float(value) for value in truth.poses[0])),
+        start,
         wanted.seed,
         on_layer=note,
         overlap_of=_overlap_of(cache, session, settings),

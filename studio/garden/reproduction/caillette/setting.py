@@ -44,6 +44,8 @@ LEARNT_AS_PRINTED: Mapping[str, Any] = {
     name: value for entry in CAILLETTE.learning for name, value in entry.sets.items() if name != "memory"
 }
 """What the preset says of learning; the memory is each experiment's own."""
+LOST_BELOW = 1.5
+"""Nats a voxel below which a frame is lost in the figures: what `caillette-loss-test` chooses on other clips."""
 GUIDED = "behaviour"
 # The annealing of the paper's time: planned noise (Eq. 13 of Deutscher & Reid), half surviving, no crossover.
 PLANNED: Mapping[str, Any] = {"adaptive_diffusion": False, "crossover": 0.0, "survival": 0.5}

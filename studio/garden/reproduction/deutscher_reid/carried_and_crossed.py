@@ -13,7 +13,7 @@ success (no marker of a limb ever 150 mm off) stands how long a run lasts until 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from studio.garden.reproduction.claims import share
+from studio.garden.reproduction.claims import ratio, share
 from studio.garden.reproduction.deutscher_reid.setting import (
     EQ17_WORDS,
     EQ18_WORDS,
@@ -36,8 +36,8 @@ from studio.garden.reproduction.tracking import (
     summary_table,
     tracked_experiment,
 )
-from studio.results.comparison.findings import Table
-from studio.results.comparison.statistics import number, sign_test
+from studio.results.comparison.findings import FIRM_SEEDS, Number, Table
+from studio.results.comparison.statistics import equal_to, number, sign_test
 from studio.results.comparison.tracked import Tracked
 
 CLIPS = {"walk": "walk", "turns": "choosing-turns", "kick": "choosing-kick"}
@@ -60,6 +60,26 @@ SIZES = (100, 200)
 def lasting(run: Tracked) -> float:
     """Share of a run's frames before it fails for good, 1 where its last frame is good."""
     return terminal_failure(run) * FPS / len(run.frames)
+
+
+def over_clips(groups: Groups, name: str) -> list[float]:
+    """Each seed's mean error over all clips, mm."""
+    runs = zip(*(mean_errors(groups[f"{name}, {clip}"]) for clip in CLIPS), strict=True)
+    return [sum(errors) / len(CLIPS) for errors in runs]
+
+
+def in_words(compared: Number) -> str:
+    """What a ratio of errors shows, where all of its interval lies on one side of 1."""
+    if not compared.seeds >= FIRM_SEEDS:
+        return f"was tried with {compared.seeds} seeds, too few to conclude"
+    if compared.high < 1.0:
+        return f"is nearer (error × {compared.ours:.2f})"
+    if compared.low > 1.0:
+        return f"is farther off (error × {compared.ours:.2f})"
+    low, high = equal_to(1.0)
+    if low <= compared.low and compared.high <= high:
+        return "makes no difference"
+    return "shows no difference, nor that there is none"
 
 
 def _lines(candidates: Mapping[str, Mapping[str, Any]], quick: bool) -> Iterable[Line]:
@@ -87,8 +107,7 @@ def _results(groups: Groups, names: Sequence[str], pairs: Sequence[tuple[str, st
         tests.append((f"{ours} against {theirs}", f"{signs.better} : {signs.worse}", float(f"{signs.p:.2g}")))
     for name in names:
         runs = [run for clip in CLIPS for run in groups[f"{name}, {clip}"]]
-        by_clip = zip(*(groups[f"{name}, {clip}"] for clip in CLIPS), strict=True)
-        yield number(f"{name}: mean error", [sum(mean_errors(seed)) / len(CLIPS) for seed in by_clip], "mm")
+        yield number(f"{name}: mean error", over_clips(groups, name), "mm")
         yield share(f"{name}: runs that track", map(succeeded, runs), None)
         yield number(f"{name}: lasts until it fails for good", map(lasting, runs), "of 1")
         yield number(f"{name}: frames with a limb lost", map(lost_percent, runs), "%")
@@ -116,12 +135,22 @@ def _carried(groups: Groups) -> Iterator[Part]:
     pairs += [(f"{so_far}, {words}", f"{eq13}, {words}") for words in CARRIED]
     yield from _results(groups, tuple(CARRYING), pairs)
     for base in BASES:
-        errors = {
-            words: sum(sum(mean_errors(groups[f"{base}, {words}, {clip}"])) for clip in CLIPS)
-            for words in CARRIED
-        }
-        best = min(errors, key=lambda words: errors[words])
-        yield f"With {base} the mean error is smallest where {best} starts the next frame."
+        for other in others:
+            whole = ratio(
+                f"{base}, all clips: {other} over {usual}",
+                over_clips(groups, f"{base}, {other}"),
+                over_clips(groups, f"{base}, {usual}"),
+            )
+            yield whole
+            yield f"{base}: {other} instead of {usual} {in_words(whole)}."
+    for words in CARRIED:
+        whole = ratio(
+            f"{words}, all clips: {so_far} over {eq13}",
+            over_clips(groups, f"{so_far}, {words}"),
+            over_clips(groups, f"{eq13}, {words}"),
+        )
+        yield whole
+        yield f"The product of the layers so far instead of the printed one, {words}: {in_words(whole)}."
     yield f"{EQ17_WORDS} {EQ18_WORDS}"
     yield {
         "clips": ", ".join(CLIPS.values()),
