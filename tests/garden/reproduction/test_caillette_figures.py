@@ -305,7 +305,7 @@ def test_fig_11_requires_that_the_printed_tracker_recovers() -> None:
     taught = {trial.label: trial.arguments for trial in EXPERIMENTS["caillette-fig-11"].trials(SCALE)}
     for label, arguments in taught.items():
         assert bool(arguments.get("taught")) == ("recovery" in label or "true poses" in label), label
-        assert "recovery" not in label or arguments["changes"]["blob_lost"] == setting.LOST_BELOW
+        assert "recovery" not in label or arguments["lost_below"] in setting.LOST_BELOW.values()
 
 
 @pytest.mark.parametrize("name", ["caillette-fig-9", "caillette-fig-10"])

@@ -5,6 +5,7 @@ import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.volume.blob_fitting import fit_blobs
 from studio.evidence.volume.relative_entropy import DivergenceOfPoses
 from studio.foundations.arrays import Array
 from studio.foundations.errors import SettingsError
@@ -163,7 +165,22 @@ def taught_blobs(
     return memory
 
 
-LATER = ("recovers", "covered", "taught")
+def placed_quality(problem: FrameLikelihood, pose: Array, memory: Mapping[str, Array]) -> float:
+    """Likelihood of the voxels by the learnt blobs where a pose (D,) puts them, not fitted, less these blobs' own, nats
+    a voxel; -inf where nothing is seen. Raises SettingsError for a likelihood without blobs.
+    """
+    if not isinstance(problem, BlobFrameLikelihood):
+        raise SettingsError("This likelihood has no blobs.", "Take one that fits blobs.")
+    if problem.hull.empty:
+        return float("-inf")
+    likelihood = problem.likelihood
+    model = likelihood.model(memory)
+    return fit_blobs(problem.hull, model, likelihood.body, pose[None], 0, moved=False).margin
+
+
+FITTED, PLACED = "fitted", "placed"
+"""What a loss is told by: the likelihood of the blobs fitted from the pose, as printed, or of those that it places."""
+LATER = ("recovers", "covered", "taught", "lost_by", "lost_below")
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +191,8 @@ class Follow:
     name. from_truth : blobs are fitted from the true pose in every frame. training : of the behaviour
     model, None without one. recovers : by the paper's own recovery (`Recovering`). covered : by occluded evidence
     (`occluded`), with blobs fitted from the true pose. taught : the run begins with blobs that were learnt from the
-    true poses of the first frames (`taught_blobs`).
+    true poses of the first frames (`taught_blobs`). lost_by, lost_below : with recovery, FITTED or PLACED, and
+    how many nats a voxel below a body like the blobs a frame counts as lost; "": FITTED, by the knob.
     """
 
     footage: str
@@ -188,6 +206,8 @@ class Follow:
     recovers: bool = False
     covered: bool = False
     taught: bool = False
+    lost_by: str = ""
+    lost_below: float = 0.0
 
     def plain(self) -> dict[str, Any]:
         """As a trial's arguments; those of LATER only where they are, so that stored outcomes stay valid."""
@@ -257,13 +277,15 @@ class Followed:
 
 @dataclass(eq=False)
 class Recovering(Following):
-    """Following with the recovery of section 6.3. resets : of each frame.
+    """Following with the recovery of section 6.3. lost_by, lost_below : as in `Follow`. resets : of each frame.
 
     Where the best mixture of blobs gives the voxels a poor likelihood the states of all particles are reset, which
     spreads them over the clusters, and the frame's blobs are fitted from all clusters that hold one before it is
     searched again. Roots stay, with noise of σ0.
     """
 
+    lost_by: str = ""
+    lost_below: float = 0.0
     resets: list[bool] = field(default_factory=list[bool])
 
     def step(self, frame: int, problem: FrameLikelihood, seen: FrameEvidence | None = None) -> FrameResult:
@@ -292,11 +314,15 @@ class Recovering(Following):
             self.settings = usual
 
     def _is_lost(self, problem: FrameLikelihood, before: FilterState, result: FrameResult) -> bool:
-        """Whether blobs fitted from where the body was found give the voxels a poor likelihood."""
+        """Whether blobs fitted from where the body was found, or placed there, give the voxels a poor likelihood."""
+        if self.lost_by == PLACED:
+            return placed_quality(problem, result.estimate.pose, before.memory) < -self.lost_below
         if not isinstance(problem, FittedToPoses):
             return False
         fitted = problem.expecting(result.estimate.pose[None], before.memory)
-        return isinstance(fitted, QualityMeasured) and fitted.lost_evidence
+        if not isinstance(fitted, QualityMeasured):
+            return False
+        return fitted.quality < -self.lost_below if self.lost_by else fitted.lost_evidence
 
 
 RESET_KEY = 0x5EED
@@ -374,7 +400,8 @@ def run_of(
             free.append(float(record.model_free_share))
 
     fitted = None if model is None else fitting(model, body, fps)
-    following = (Recovering if wanted.recovers else Following)(
+    recovering = partial(Recovering, lost_by=wanted.lost_by, lost_below=wanted.lost_below)
+    following = (recovering if wanted.recovers else Following)(
         settings,
         search_space(body, session_sigma(session, body, fps), fitted),
         start,

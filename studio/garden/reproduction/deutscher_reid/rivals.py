@@ -251,7 +251,8 @@ def shown_dimensions(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         f"Success is no joint or tip more than {LOST_MM:g} mm off, a quarter of a link. A partition's and a layer's "
         f"particles are counted, so that four joints cost partitioned sampling four times as many evaluations and the "
         f"annealed filter {ARM_LAYERS} times. α: by the exponent with which a tenth of a cloud of one unknown joint "
-        "survives; the law says that four joints' is its fourth power."
+        f"survives, of {SURVIVORS} particles; the law says that four joints' is its fourth power. A cloud without a "
+        "particle near the peak seems to survive better."
     )
     yield from needs("Particles needed by unknown joints", groups)
     series = []
