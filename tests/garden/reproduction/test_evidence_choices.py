@@ -10,6 +10,7 @@ from studio.evidence.volume.blob_model import cone_blobs
 from studio.evidence.volume.relative_entropy import DivergenceOfPoses
 from studio.garden.reproduction.caillette import hulls_and_blobs as choices
 from studio.garden.reproduction.caillette import loss_test
+from studio.garden.reproduction.caillette.following import FITTED, PLACED
 from studio.garden.reproduction.catalogue import EXPERIMENTS
 from studio.results.comparison.findings import Findings
 from studio.results.comparison.trials import Outcome, Scale
@@ -114,40 +115,51 @@ def test_a_segmentation_is_carved_as_it_is() -> None:
     assert np.all(squared[mask == 0] == 0.0)
 
 
-def qualities(lost: float, true_shown: float = 0.0):
-    """True poses about 0 (those of the figures about `true_shown`), moved ones at `lost`."""
+def qualities(lost: float, true_shown: float = 0.0, placed: float = -3.0):
+    """True poses about 0 (those of the figures about `true_shown`), moved ones at `lost`, or `placed`."""
 
     def made(trial):
         shown = trial.arguments["footage"] in loss_test.SHOWN
         rng = np.random.default_rng(trial.arguments["seed"])
         true = (true_shown if shown else 0.0) + np.linspace(-0.5, 0.5, 20)
-        quality = {loss_test.TRUE: true.tolist()}
-        away = {loss_test.TRUE: [0.0] * 20}
+        chosen_by = -2.0 if not shown else lost
+        measured = {"away": {loss_test.TRUE: [0.0] * 20}, FITTED: {loss_test.TRUE: true.tolist()}}
+        measured[PLACED] = {loss_test.TRUE: true.tolist()}
         for kind in loss_test.KINDS:
-            quality[kind] = (lost + rng.normal(0.0, 0.01, 20)).tolist()
-            away[kind] = [300.0] * 20
-        return {"quality": quality, "away": away}
+            measured[FITTED][kind] = (chosen_by + rng.normal(0.0, 0.01, 20)).tolist()
+            measured[PLACED][kind] = (placed + rng.normal(0.0, 0.01, 20)).tolist()
+            measured["away"][kind] = [300.0] * 20
+        return measured
 
     return made
 
 
 def test_a_threshold_of_other_clips_must_catch_losses_without_false_alarms() -> None:
-    name = "caillette-loss-test"
+    name, lost, false = (
+        "caillette-loss-test",
+        "lost poses that are called lost",
+        "true poses that are called lost",
+    )
     good = concluded(name, qualities(-2.0))
-    assert verdict(good, "lost poses that are called lost, clips") == "reproduced"
+    assert good.verdict == "reproduced"
     assert verdict(good, "area under the ROC of lost") == "answered"
-    assert good.settings["threshold chosen (nats a voxel)"] == pytest.approx(0.5)
+    # The loosest cut of the choosing clips that calls no true pose lost.
+    assert good.settings["threshold chosen, fitted (nats a voxel)"] == pytest.approx(0.5)
     blind = concluded(name, qualities(-0.3))
-    assert verdict(blind, "lost poses that are called lost, clips") == "not reproduced"
+    assert verdict(blind, lost) == "not reproduced"
     assert blind.verdict == "not reproduced"
     nervous = concluded(name, qualities(-2.0, true_shown=-1.5))
-    assert verdict(nervous, "true poses that are called lost") == "not reproduced"
+    assert verdict(nervous, false) == "not reproduced"
     assert nervous.verdict == "not reproduced"
 
     def half(trial):
         return qualities(-2.0 if trial.arguments["seed"] % 2 else -0.3)(trial)
 
-    assert verdict(concluded(name, half), "lost poses that are called lost, clips") == "undecided"
+    assert verdict(concluded(name, half), lost) == "undecided"
+    # Placed blobs are ours: no claim rests on them.
+    assert concluded(name, qualities(-2.0, placed=0.3)).verdict == "reproduced"
+    ours = [entry for entry in good.numbers if entry.name.endswith(loss_test.TESTS[PLACED])]
+    assert {entry.verdict for entry in ours} == {"answered"}
 
 
 def test_the_area_under_the_roc() -> None:
@@ -155,6 +167,11 @@ def test_the_area_under_the_roc() -> None:
     assert loss_test.area_under(true, wrong) == 1.0
     assert loss_test.area_under(true, true) == 0.5
     assert loss_test.area_under(wrong, true) == 0.0
+
+
+def test_the_threshold_is_where_the_roc_is_farthest_from_chance() -> None:
+    true, wrong = np.array([-1.0, 0.0, 1.0, 2.0]), np.array([-4.0, -3.0, -2.0, 1.5])
+    assert loss_test.chosen_threshold(true, wrong) == 1.0
 
 
 def test_poses_are_moved_by_the_amounts_that_their_names_say() -> None:

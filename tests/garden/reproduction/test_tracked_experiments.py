@@ -6,13 +6,16 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from studio.foundations.package import assets_folder
 from studio.garden.drawn_recipes import KINDS
 from studio.garden.reproduction.catalogue import EXPERIMENTS
+from studio.garden.reproduction.deutscher_reid.carried_and_crossed import in_words
 from studio.garden.reproduction.experiment import group_of
+from studio.garden.reproduction.fleischmann import SHARED
 from studio.garden.reproduction.open_questions.generalisation import ENTRIES
-from studio.garden.reproduction.plan import footage_of, frames_of
+from studio.garden.reproduction.plan import footage_of, frames_of, plan, scale_of
 from studio.garden.reproduction.tracking import by_group, curves, spells
-from studio.results.comparison.findings import VERDICTS, Findings
+from studio.results.comparison.findings import VERDICTS, Findings, Number
 from studio.results.comparison.tracked import Tracked, TrackingTrial, tracking_trial
 from studio.results.comparison.trials import Outcome, Scale, Trial
 
@@ -134,6 +137,93 @@ def test_partitions_require_soft_to_be_better_than_all_but_three_stages() -> Non
         return 30.0 if "three" in label else as_claimed(label)
 
     assert concluded("fleischmann-partitions", three_is_better, FIVE).verdict == "not reproduced"
+
+
+SHARED_BY = {
+    "fleischmann-fig-3": "60 frames a second, seed",
+    "fleischmann-fig-6": "swarm, 60 Hz, seed",
+    "fleischmann-table-2": "1000 evaluations, seed",
+    "fleischmann-constraints": "swarm, 60 Hz, with priors, seed",
+    "fleischmann-best-figure": "swarm, paper's fitness, seed",
+    "fleischmann-partitions": "soft, two stages, 60 Hz, seed",
+}
+"""The printed swarm at 60 Hz with 1000 evaluations, in the words of each experiment that has it."""
+
+
+def test_one_setting_is_the_same_kept_trials_and_one_number() -> None:
+    scale = scale_of()
+    keys: dict[str, list[str]] = {}
+    for name, words in SHARED_BY.items():
+        jobs = [job for job in plan(EXPERIMENTS[name], scale).jobs if job.label.startswith(words)]
+        keys[name] = [job.key for job in jobs[: len(scale.seeds)]]
+    assert len({tuple(own) for own in keys.values()}) == 1, keys
+    assert len(set(keys["fleischmann-fig-3"])) == 10
+
+    def number(name: str) -> tuple[float, float, float]:
+        def error(label: str) -> float:
+            return 31.0 if label.startswith(SHARED_BY[name]) else 50.0
+
+        found = [entry for entry in concluded(name, error, scale).numbers if entry.name == SHARED]
+        assert len(found) == 1, name
+        assert found[0].seeds == 10
+        return found[0].ours, found[0].low, found[0].high
+
+    assert len({number(name) for name in SHARED_BY}) == 1
+
+
+def test_partitions_have_thirty_seeds_where_all_are_run() -> None:
+    experiment = EXPERIMENTS["fleischmann-partitions"]
+
+    def seeds_of(scale: Scale, words: str) -> int:
+        return sum(trial.label.startswith(words) for trial in experiment.trials(scale))
+
+    assert seeds_of(scale_of(), "global, 60 Hz, seed") == 30
+    assert seeds_of(scale_of(), "global, 60 Hz, σ0 × 0.5, seed") == 10
+    assert seeds_of(scale_of(40), "global, 60 Hz, seed") == 40
+    assert seeds_of(scale_of(3), "global, 60 Hz, seed") == 3
+    assert seeds_of(scale_of(quick=True), "global, 60 Hz, seed") == 3
+
+
+def test_the_guide_has_one_number_for_the_shared_setting() -> None:
+    """Kept findings of one commit, and the table of figures where these are there, say the same number."""
+    folder = assets_folder() / "guide"
+    kept: dict[str, tuple[tuple[str, ...], float]] = {}
+    for name in SHARED_BY:
+        document = json.loads((folder / "reproduction" / f"{name}.json").read_text())
+        for entry in document["numbers"]:
+            if entry["name"] == SHARED:
+                kept[name] = tuple(document["commits"]), round(entry["ours"], 1)
+    assert len({value for _, value in kept.values()}) <= 1, kept
+    if kept:
+        value = next(value for _, value in kept.values())
+        rows = [
+            row for row in (folder / "figures.md").read_text().splitlines() if "swarm, paper's fitness" in row
+        ]
+        assert all(f"{value:.1f} mm" in row for row in rows), (
+            f"figures.md has another number than {value:.1f} mm"
+        )
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [(30.0, "is nearer"), (60.0, "is farther off"), (40.0, "makes no")]
+)
+def test_what_is_carried_ends_in_a_conclusion(error: float, words: str) -> None:
+    def error_of(label: str) -> float:
+        return error if "the mode" in label and label.startswith("Eq. 13, the mode") else 40.0
+
+    found = concluded("deutscher-carried", error_of, scale_of())
+    assert f"Eq. 13: the mode instead of every particle {words}" in found.words
+    assert "section 6: the mode instead of every particle makes no difference" in found.words
+    few = concluded("deutscher-carried", error_of, FIVE)
+    assert "too few to conclude" in few.words
+    assert (
+        len({trial.arguments["seed"] for trial in EXPERIMENTS["deutscher-carried"].trials(scale_of())}) == 10
+    )
+
+
+def test_a_wide_interval_is_no_conclusion() -> None:
+    wide = Number("", 1.0, 0.7, 1.4, "×", None, "", 10, "answered")
+    assert in_words(wide) == "shows no difference, nor that there is none"
 
 
 def test_spells_are_rows_of_frames_with_a_limb_lost() -> None:
