@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, Indices, Mask
 from studio.foundations.progress import report
 from studio.garden.reproduction.claims import LOWER, NO_WORSE, beside
 from studio.garden.reproduction.experiment import Part, each_seed, grouped, listed
@@ -164,7 +164,7 @@ class SwarmSearch:
     def _stage(self, start: Array, stage: SwarmStage, sigma: Array) -> Array:
         rng, shape = self.rng, (stage.particles, len(start))
 
-        def sample(rows: Array) -> Array:
+        def sample(rows: Indices) -> Array:
             return start + rng.normal(size=(len(rows), len(start))) * sigma
 
         poses, _ = self._redrawn(
@@ -178,7 +178,7 @@ class SwarmSearch:
             leaders = self._leaders(bests, best_values, (iteration - 2) / (stage.iterations - 2))
 
             def move(
-                rows: Array,
+                rows: Indices,
                 c: float = c,
                 poses: Array = poses,
                 velocities: Array = velocities,
@@ -205,7 +205,7 @@ class SwarmSearch:
         pool = np.flatnonzero(steps == steps.max())
         return bests[self.rng.choice(pool, len(bests))]
 
-    def _redrawn(self, draw: Callable[[Array], tuple[Array, Array]], count: int) -> tuple[Array, Array]:
+    def _redrawn(self, draw: Callable[[Indices], tuple[Array, Array]], count: int) -> tuple[Array, Array]:
         """Poses and velocities, drawn again where a prior is broken, up to TRIES times."""
         poses, velocities = draw(np.arange(count))
         for _ in range(TRIES):
@@ -215,8 +215,8 @@ class SwarmSearch:
             poses[wrong], velocities[wrong] = draw(wrong)
         return poses, velocities
 
-    def _possible(self, poses: Array) -> Array:
-        return np.asarray(self.problem.feasible(poses, limbs_apart=True))
+    def _possible(self, poses: Array) -> Mask:
+        return self.problem.feasible(poses, limbs_apart=True)
 
 
 QUICK_LAST = 20
@@ -256,6 +256,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
             session, cameras, frame, settings.evidence, chosen.edge_kind, chosen.reads_pictures
         )
         problem = likelihood.problem(seen)
+        assert isinstance(problem, EdgeSilhouetteFrameLikelihood)
         search = SwarmSearch(SWARMS[arguments["swarm"]], problem, rng)
         pose, evaluations = search.pose(pose, space), search.evaluations
         poses.append(pose)

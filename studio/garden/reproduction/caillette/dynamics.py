@@ -181,7 +181,8 @@ def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         for one, without in ((RESETS, TAUGHT), (GUIDED_RESETS, GUIDED_TAUGHT))
     )
     rows.append(("recovery leads back, joint position", recovered, ours_too))
-    rows.append(("a loss is detected", *(_detected(one.name, groups[one.name]) for one in RESETTING)))
+    detected, ours_detected = (_detected(one.name, groups[one.name]) for one in RESETTING)
+    rows.append(("a loss is detected", detected, ours_detected))
     yield from (number for _, number, _ in rows)
     yield from (beside(number) for _, _, number in rows)
     yield from (beside(loses(one, 0.0)) for one in (PRINTED_KEEPS, TAUGHT, SEEN, KEEPS, GUIDED_TAUGHT))
@@ -209,7 +210,7 @@ def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 
 
 RECOVERY, RECOVERY_SEEN = (
-    {"taught": True, "recovers": True, "lost_by": test, "lost_below": LOST_BELOW[test]}
+    dict[str, Any](taught=True, recovers=True, lost_by=test, lost_below=LOST_BELOW[test])
     for test in (FITTED, PLACED)
 )
 

@@ -232,13 +232,11 @@ def measure_splitting(arguments: Mapping[str, Any], cache: FootageCache) -> dict
 
 def shown_splitting(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """What splitting gains in frames that were not learnt from."""
-    gained = [
-        float(
-            np.mean(outcome.measured[SPLIT]["likelihood"])
-            - np.mean(outcome.measured[WHOLE_LIMBS]["likelihood"])
-        )
-        for outcome in outcomes
-    ]
+    means = {
+        name: [float(np.mean(list(map(float, outcome.measured[name]["likelihood"])))) for outcome in outcomes]
+        for name in (WHOLE_LIMBS, SPLIT)
+    }
+    gained = [after - before for before, after in zip(*means.values(), strict=True)]
     yield beyond(number("likelihood gained by splitting, frames after", gained, "nats/voxel"), 0.0, HIGHER)
     yield number("blobs, split", [outcome.measured[SPLIT]["blobs"] for outcome in outcomes])
     yield number("body parts", [outcome.measured["parts"] for outcome in outcomes])
@@ -247,13 +245,8 @@ def shown_splitting(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         f"every {EVERY}th frame after them: more blobs are likelier anyway in the frames that they were learnt from."
     )
     rows = tuple(
-        (
-            outcome.trial.label,
-            outcome.measured[SPLIT]["blobs"],
-            round(float(np.mean(outcome.measured[WHOLE_LIMBS]["likelihood"])), 3),
-            round(float(np.mean(outcome.measured[SPLIT]["likelihood"])), 3),
-        )
-        for outcome in outcomes
+        (outcome.trial.label, outcome.measured[SPLIT]["blobs"], round(before, 3), round(after, 3))
+        for outcome, before, after in zip(outcomes, *means.values(), strict=True)
     )
     heads = ("clip", "blobs, split", "one a part (nats/voxel)", "split (nats/voxel)")
     yield Table("Likelihood of the voxels", heads, rows)
@@ -342,8 +335,8 @@ def measure_divergence(arguments: Mapping[str, Any], cache: FootageCache) -> dic
 
 def shown_divergence(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """Whether Eq. 9 prefers poses as near as Eq. 8 does."""
-    groups = grouped(outcomes)
-    of = {
+    groups: Mapping[str, list[dict[str, Any]]] = grouped(outcomes)
+    of: dict[str, dict[str, list[float]]] = {
         clip: {name: [run["errors"][name] for run in runs] for name in (NEAREST, KEPT)}
         for clip, runs in groups.items()
     }

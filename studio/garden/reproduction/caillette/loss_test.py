@@ -201,16 +201,18 @@ def _table(title: str, test: str, threshold: float, runs: Sequence[Outcome]) -> 
     rows: list[tuple[Any, ...]] = []
     for kind in (TRUE, *KINDS):
         under = [area_under(_of(outcome, test, TRUE), _of(outcome, test, kind)) for outcome in runs]
-        named = [(_of(outcome, test, kind) < -threshold).mean() for outcome in runs]
-        quality = [_of(outcome, test, kind).mean() for outcome in runs]
-        distance = [np.mean(outcome.measured["away"][kind]) for outcome in runs]
-        cells = (
-            (distance, 0),
-            (quality, 2),
-            (under, 3),
-            (named, 3),
+        named = [float((_of(outcome, test, kind) < -threshold).mean()) for outcome in runs]
+        quality = [float(_of(outcome, test, kind).mean()) for outcome in runs]
+        distance = [float(_of(outcome, "away", kind).mean()) for outcome in runs]
+        rows.append(
+            (
+                kind,
+                round(float(np.mean(distance))),
+                round(float(np.mean(quality)), 2),
+                round(float(np.mean(under)), 3),
+                round(float(np.mean(named)), 3),
+            )
         )
-        rows.append((kind, *(round(float(np.mean(values)), digits) for values, digits in cells)))
     heads = ("pose", "away, RMS (mm)", "quality (nats a voxel)", "area under the ROC", "called lost")
     return Table(title, heads, tuple(rows))
 

@@ -31,7 +31,7 @@ import numpy as np
 
 from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import kinematic_tables
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, Indices
 from studio.foundations.progress import report
 from studio.garden.reproduction.claims import HIGHER, LOWER, beyond, geometric_mean, saved
 from studio.garden.reproduction.deutscher_reid.arms import TemplateArm, silhouette, template_arm, true_pose
@@ -49,7 +49,7 @@ from studio.garden.reproduction.deutscher_reid.setting import BODY, CIRCLE, PLAI
 from studio.garden.reproduction.drawing import line
 from studio.garden.reproduction.experiment import Part, each_seed, grouped, listed
 from studio.garden.reproduction.tracking import curves, error_ratio, lost_percent, mean_number, summary_table
-from studio.results.comparison.findings import Chart
+from studio.results.comparison.findings import Chart, Series
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.statistics import number
 from studio.results.comparison.tracked import Tracked, measured, start_of_trial
@@ -132,7 +132,7 @@ class LinksInside:
         """(N,) minus the squared difference (Eq. 15), mean over the points of a link, of poses (N, D)."""
         frames = limb_frames(self.scene.body, poses)[:, link]
         camera = self.scene.camera
-        shares = []
+        shares: list[Array] = []
         # Across the bone in either direction of its own axes: one of them lies in the picture's plane.
         for swap in (False, True):
             local = self.points[link][:, [1, 0, 2]] if swap else self.points[link]
@@ -144,10 +144,10 @@ class LinksInside:
             within = (column >= 0) & (column < width) & (row >= 0) & (row < height)
             inside = within & self.mask[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
             shares.append(inside.mean(axis=1))
-        return np.minimum(*shares) - 1.0
+        return np.minimum(shares[0], shares[1]) - 1.0
 
 
-def survivors(rng: np.random.Generator, log_weights: Array, survival: float) -> Array:
+def survivors(rng: np.random.Generator, log_weights: Array, survival: float) -> Indices:
     """(N,) rows drawn by weight, annealed so that a share survives."""
     weights = np.exp(anneal(log_weights, survival).log_weights)
     return rng.choice(len(weights), len(weights), p=weights / weights.sum())
@@ -169,8 +169,8 @@ def searched_pose(
             poses = poses_with(truth, joints, values)
             if joint == joints - 1:
                 return poses[int(np.argmax(problem.log_likelihood(poses)))]
-            weights = sum(links(poses, link) for link in range(joint + 1))
-            values = values[survivors(rng, np.asarray(weights), SURVIVAL)]
+            weights = np.sum([links(poses, link) for link in range(joint + 1)], axis=0)
+            values = values[survivors(rng, weights, SURVIVAL)]
     lower, upper = scene.space.lower.copy(), scene.space.upper.copy()
     lower[joints:] = upper[joints:] = truth[joints:]
     sigma = np.where(np.arange(len(truth)) < joints, scene.space.sigma, 0.0)
@@ -255,7 +255,7 @@ def shown_dimensions(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         "particle near the peak seems to survive better."
     )
     yield from needs("Particles needed by unknown joints", groups)
-    series = []
+    series: list[Series] = []
     for search in (ONE_WEIGHTING, PARTITIONED, ANNEALED):
         needed = [
             float(geometric_mean([entry.particles for entry in of(search, joints)]))
