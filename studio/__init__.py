@@ -50,6 +50,7 @@ _VERBS = {
         "smooth",
         "verify",
     ),
+    "studio.operations.rigs": ("rig",),
     "studio.operations.sharing": ("share",),
     "studio.operations.subjects": ("subjects", "together"),
     "studio.operations.tracking": (

@@ -56,6 +56,7 @@ from studio.operations.results import read_track as read_track
 from studio.operations.results import refine as refine
 from studio.operations.results import smooth as smooth
 from studio.operations.results import verify as verify
+from studio.operations.rigs import rig as rig
 from studio.operations.sharing import share as share
 from studio.operations.subjects import subjects as subjects
 from studio.operations.subjects import together as together

@@ -1,7 +1,8 @@
-"""What shows the inside of runs: `view`, `why`, `seeds`, `compare-runs`."""
+"""What shows the inside of runs: `view`, `why`, `seeds`, `uncertainty`, `rig`, `compare-runs`."""
 
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -20,9 +21,11 @@ from studio.operations.inspecting import (
     worst_frame,
     write_tables,
 )
+from studio.operations.rigs import rig
 from studio.results.inspection.comparing import RunsCompared
 from studio.results.inspection.error_parts import ErrorSplit
 from studio.results.inspection.tables import Cell, Table, Viewed
+from studio.results.rig.study import RunRig, tables_of
 from studio.results.uncertainty.half_widths import RunUncertainty
 
 MOST_ROWS = 40
@@ -87,6 +90,24 @@ def uncertainty_command(call: Call, file: Path | None) -> dict[str, object]:
     known: RunUncertainty = call()
     shown = view(call.given["run"], "uncertainty")
     return _answer(shown.tables, known.words, inspected(call.given["run"]).caption(), file)
+
+
+@command_of(rig, CSV)
+def rig_command(call: Call, file: Path | None) -> dict[str, object]:
+    known: RunRig = call()
+    assert known.study is not None
+    caption = inspected(call.given["run"]).caption()
+    tables = {one.name: one for one in tables_of(known.study)}
+    present = known.study.present.name
+    own = [row for row in tables["joints"].rows if row[0] == present]
+    best = sorted(tables["places"].rows, key=lambda row: row[-1] or len(tables["places"].rows))
+    shown = {
+        **tables,
+        "joints": replace(tables["joints"], title="By joint, as the rig is", rows=own),
+        "places": replace(tables["places"], rows=[row for row in best if row[-1]]),
+    }
+    text = _answer([*shown.values()], known.words, caption, file)["text"]
+    return _answer([*tables.values()], known.words, caption, file) | {"text": text}
 
 
 @command_of(compare_runs, CSV)

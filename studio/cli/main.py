@@ -47,6 +47,7 @@ COMMANDS = {
     "seeds": ("inspection_commands", "operations.inspecting.seeds"),
     "split-error": ("inspection_commands", "operations.inspecting.split_error"),
     "uncertainty": ("inspection_commands", "operations.inspecting.uncertainty"),
+    "rig": ("inspection_commands", "operations.rigs.rig"),
     "compare-runs": ("inspection_commands", "operations.inspecting.compare_runs"),
     "refine": ("result_commands", "operations.results.refine"),
     "smooth": ("result_commands", "operations.results.smooth"),

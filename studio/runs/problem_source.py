@@ -60,7 +60,7 @@ class ProblemSource:
         footage: Footage | None = None,
     ) -> None:
         self.body = body
-        self.cameras = filmed_cameras(session, cameras) if cameras else session.cameras()
+        self.cameras = filmed_cameras(session, cameras, footage) if cameras else session.cameras()
         self.footage = footage or session.footage()
         self._last = self.footage.frame_count if last is None else last
         self._backgrounds = Backgrounds(self.footage)

@@ -19,9 +19,13 @@ def footage_of(session: Session, run: StoredRun | None) -> Footage:
     return PingPong(footage.source, footage.folder)
 
 
-def filmed_cameras(session: Session, cameras: tuple[Camera, ...]) -> tuple[Camera, ...]:
-    """Those of a run's cameras that the session has footage of. Raises RunError if there is none left."""
-    filmed = {source.name for source in session.manifest.footage.cameras}
+def filmed_cameras(
+    session: Session, cameras: tuple[Camera, ...], footage: Footage | None = None
+) -> tuple[Camera, ...]:
+    """Those of a run's cameras that there is footage of, the session's by default. Raises RunError if there is none
+    left.
+    """
+    filmed = {source.name for source in (footage.source if footage else session.manifest.footage).cameras}
     kept = tuple(camera for camera in cameras if camera.name in filmed)
     if not kept:
         raise RunError(

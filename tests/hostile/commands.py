@@ -68,6 +68,7 @@ OTHERS = {
     "seeds": "minutes",
     "split-error": "minutes",
     "uncertainty": "minutes",
+    "rig": "minutes",
     "compare-runs": "reads as view does",
     "correct": "minutes",
     "branch": "tracks",

@@ -235,6 +235,7 @@ PYTHON: Mapping[str, Callable[[Given], object]] = {
     "seeds": lambda at: studio.seeds(at.run, 1, count=2),
     "split the error": lambda at: studio.split_error(at.run, frame=1, evaluations=1000),
     "uncertainty": lambda at: studio.uncertainty(at.run),
+    "rig": lambda at: studio.rig(at.run),
     "view": lambda at: studio.view(at.run, "variance"),
     "why": lambda at: studio.why(at.run, 1),
     "workflow": lambda at: studio.workflow(at.name),

@@ -41,6 +41,7 @@ from studio.app.server import (
     pose_routes,
     report_routes,
     result_routes,
+    rig_routes,
     run_routes,
     scene_picture_routes,
     scene_relay,
@@ -115,6 +116,7 @@ ROUTERS = (
     picture_routes.router,
     course_routes.router,
     view_routes.router,  # after the pictures, whose addresses are more special
+    rig_routes.router,
     comparison_routes.router,
     behaviour_routes.router,
     behaviour_learning_routes.router,
@@ -141,6 +143,7 @@ JOBS: tuple[JobKind[Any], ...] = (
     export_routes.EXPORT,
     COURSE,
     view_routes.SEEDS,
+    rig_routes.RIG,
     COMPARISON,
     LEARNING,
     report_routes.REPRODUCTION,

@@ -6,7 +6,7 @@ from starlette.responses import Response
 
 from studio.app.server.answers import Router
 from studio.app.server.app_state import App
-from studio.app.server.pages import NAME, PLACES, html_page
+from studio.app.server.pages import NAME, OF_RUNS, PLACES, html_page
 from studio.operations.preferences import change_preferences, read_preferences
 
 router = Router(tags=["page"])
@@ -15,7 +15,7 @@ DOCUMENT = "document.html"
 """One frame with a bar of places; what is in it is drawn by each page's own module."""
 RAILED = ("comparisons", "bodies", "behaviours")
 """Pages that have a list at the left, and a button that makes something."""
-UNRAILED = ("gallery", "recording", "reports", "arena")
+UNRAILED = ("gallery", "recording", "reports", "arena", "rig")
 RAIL = (
     '<nav class="rail" aria-label="{title}">\n    <div class="rail-head">\n      <h2>{title}</h2>\n      '
     '<button class="quiet small" id="new">+ New</button>\n    </div>'
@@ -43,7 +43,7 @@ def _add_document(name: str) -> None:
     @router.get(address, include_in_schema=False)
     def document_page() -> Response:
         """A page of its own beside the studio's."""
-        title = PLACES[address]
+        title = PLACES.get(address) or OF_RUNS[address]
         own = {"title": f"{title} · {NAME}", "module": name, "columns": "" if railed else "wide"}
         return html_page(DOCUMENT, address, own | {"rail": RAIL.format(title=title) if railed else ""})
 

@@ -23,6 +23,8 @@ PLACES = {
     "/arena": "Arena",
     "/guide": "Guide",
 }
+OF_RUNS = {"/rig": "Where cameras should stand"}
+"""Pages that are about one run, and are reached from it."""
 
 
 def html_page(file: str, address: str, own: Mapping[str, str]) -> HTMLResponse:

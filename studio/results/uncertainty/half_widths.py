@@ -38,12 +38,11 @@ from studio.results.uncertainty.twin import (
     not_promised,
     points_of,
     reported,
+    stamp_of,
     track_twin,
 )
-from studio.runs.tracks import track_digest
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.tracker import LOST, NO_EVIDENCE
-from studio.sessions.provenance import digests
 from studio.sessions.record_files import RecordFile
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.work_under_way import one_at_a_time
@@ -134,7 +133,7 @@ def kept_uncertainty(run: InspectedRun) -> RunUncertainty:
     if not path.exists():
         return RunUncertainty(None, "", ("How far off joints may be has not been measured: start that job.",))
     kept = _RECORD.read(path)
-    if kept.stamp == _stamp(run):
+    if kept.stamp == stamp_of(run):
         return RunUncertainty(kept, "", words_of(kept))
     words = f"The half widths no longer hold, since {STALE}: measure them again."
     return RunUncertainty(kept, STALE, (words,))
@@ -146,7 +145,7 @@ def measure_uncertainty(run: InspectedRun, progress: Progress, *, again: bool = 
     What a progress raises ends it, and nothing is kept. Raises RunError for a run of which a twin would promise too
     much.
     """
-    frames, stamp, kept = frames_of_twin(run), _stamp(run), kept_uncertainty(run)
+    frames, stamp, kept = frames_of_twin(run), stamp_of(run), kept_uncertainty(run)
     if again or kept.of is None or kept.stale:
         known = uncertainty_of(run.body, track_twin(run, frames, progress), reported(run.run).name, stamp)
         with one_at_a_time(run.run.folder.parent.parent):
@@ -159,8 +158,7 @@ def uncertainty_of(body: BodyModel, twin: TwinErrors, track: str, stamp: str) ->
     off: Array = np.linalg.norm(twin.errors, axis=2)
     alike = frames_alike(off)
     blocks = blocks_of(len(off), alike)
-    # In the axes of what carries the point, so that a bias turns with the limb.
-    local: Array = np.einsum("fmji,fmj->fmi", twin.turns, twin.errors)
+    local = twin.in_carriers
     apart = blocks_of(len(off), frames_alike(local.reshape(len(off), -1)))
     scatter: Array = np.linalg.norm(without_bias(local, apart), axis=2)
     widths, scatters = WIDER * half_widths(off, blocks), WIDER * half_widths(scatter, apart)
@@ -291,12 +289,6 @@ def _why_not_drawn(run: InspectedRun, frames: range, cameras: Sequence[str]) -> 
 
 def _known(values: Array) -> tuple[float | None, ...]:
     return tuple(float(value) if np.isfinite(value) else None for value in values)
-
-
-def _stamp(run: InspectedRun) -> str:
-    inputs = digests(run.session, ("footage", "calibration", "masks"))
-    track = reported(run.run)
-    return " ".join([track.name, track_digest(track), *(value[:12] for value in inputs.values())])
 
 
 def _path(run: StoredRun) -> Path:

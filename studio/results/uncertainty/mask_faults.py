@@ -7,6 +7,7 @@ how long it lasts stay as they were measured; when it happens does not, so that 
 its twin makes of it.
 """
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -63,13 +64,19 @@ class MaskFaults:
     def __init__(self, body: BodyModel, cameras: Sequence[Camera], poses: Array) -> None:
         """poses : (F, D) of the body in the frames that the faults are of, and that they are given to."""
         self._body, self._cameras, self._poses = body, tuple(cameras), poses
-        ends = limb_ends(body, poses)
-        self._lines: Array = np.stack([project(camera, ends)[0] for camera in cameras], axis=1)
+        self._lines = _lines_of(body, cameras, poses)
         """(F, V, L, 2, 2) pixels of the limbs' lines, NaN behind a camera."""
+        self._given_to, self._like = self._lines, list(range(len(cameras)))
         self._faults: dict[tuple[int, int], list[Fault]] = {}
         self._empty: set[tuple[int, int]] = set()
         self._measured: set[int] = set()
         self._sums: Array = np.zeros((len(cameras), 2))
+
+    def in_cameras(self, cameras: Sequence[Camera], like: Sequence[int]) -> "MaskFaults":
+        """The same faults to be given to masks of other cameras. like : whose faults each of them has, by number."""
+        other = copy.copy(self)
+        other._given_to, other._like = _lines_of(self._body, cameras, self._poses), list(like)
+        return other
 
     def measure(self, frame: int, masks: Mapping[str, Bytes]) -> None:
         """Find the faults of a frame. masks : by camera (H, W), 0 or 255."""
@@ -122,17 +129,18 @@ class MaskFaults:
 
     def given_to(self, mask: Bytes, view: int, frame: int, source: int) -> Bytes:
         """A mask (H, W) of a frame with the faults of another one, `source`."""
-        if (source, view) in self._empty:
+        if (source, self._like[view]) in self._empty:
             return np.zeros_like(mask)
         spoilt = mask
-        for fault in self._faults.get((source, view), ()):
+        for fault in self._faults.get((source, self._like[view]), ()):
             moved = self._moved(fault, view, frame, source, mask.shape)
             spoilt = cv2.subtract(spoilt, moved) if fault.is_hole else cv2.bitwise_or(spoilt, moved)
         return np.asarray(spoilt, np.uint8)
 
     def _moved(self, fault: Fault, view: int, frame: int, source: int, shape: tuple[int, ...]) -> Bytes:
         """(H, W) the area of a fault where its limb is in another frame."""
-        before, after = (self._lines[at, view, fault.limb] for at in (source, frame))
+        before = self._lines[source, self._like[view], fault.limb]
+        after = self._given_to[frame, view, fault.limb]
         if not np.isfinite(after).all():
             return np.zeros(shape, np.uint8)
         old, new = (complex(*(line[1] - line[0])) for line in (before, after))
@@ -158,6 +166,11 @@ class MaskFaults:
                 FaultShares(camera.name, float(holes), float(false), empty / frames, touched / frames)
             )
         return tuple(by_camera)
+
+
+def _lines_of(body: BodyModel, cameras: Sequence[Camera], poses: Array) -> Array:
+    ends = limb_ends(body, poses)
+    return np.stack([project(camera, ends)[0] for camera in cameras], axis=1)
 
 
 def _disc(across: int) -> Bytes:

@@ -9,9 +9,9 @@ was. Of the truth, if the session has one, nothing is read.
 
 import shutil
 import tempfile
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,7 +26,9 @@ from studio.body.person import marker_motion
 from studio.body.scale import scale_of
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
+from studio.footage.capture.calibration_files import write_calibration
 from studio.footage.capture.footage import Footage
+from studio.footage.capture.footage_source import FootageSource
 from studio.foundations.arrays import Array, Bytes, evenly_spread
 from studio.foundations.errors import RunError
 from studio.foundations.geometry.camera import Camera
@@ -45,9 +47,10 @@ from studio.runs.problem_source import ProblemSource
 from studio.runs.setup.shape_on_the_way import FIRST_FRAMES, LEAST_OVERLAP, shaped_body
 from studio.runs.sides import correct_clip
 from studio.runs.tracking_run import TrackingRun
-from studio.runs.tracks import SIDES, Track, best_track, read_track
+from studio.runs.tracks import SIDES, Track, best_track, read_track, track_digest
 from studio.search.likelihood.overlay import limb_contours
 from studio.search.settings import default_settings, settings_from_values
+from studio.sessions.provenance import digests
 from studio.sessions.results_store import ResultsWriter, create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, write_run_record
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
@@ -86,13 +89,22 @@ class TwinErrors:
     turns: Array
     faults: tuple[FaultShares, ...]
 
+    @property
+    def in_carriers(self) -> Array:
+        """(F, M, 3) the errors in the axes of what carries each point, so that a bias turns with the limb."""
+        return np.einsum("fmji,fmj->fmi", self.turns, self.errors)
+
 
 class TwinFootage(Footage):
     """What a renderer draws, under the frame numbers of a run, with masks that have faults."""
 
-    def __init__(self, own: Footage, renderer: RendererBefore, first: int, faults: MaskFaults) -> None:
-        """own : the run's footage, whose cameras and excluded areas hold here as well. first : its first frame."""
-        super().__init__(own.source, own.folder)
+    def __init__(
+        self, source: FootageSource, folder: Path, renderer: RendererBefore, first: int, faults: MaskFaults
+    ) -> None:
+        """source, folder : as of the run's footage, whose excluded areas hold here for cameras of the same names.
+        first : its first frame.
+        """
+        super().__init__(source, folder)
         self._renderer, self._first, self._given = renderer, first, faults
         self._count = renderer.frame_count
         self._views = {name: at for at, name in enumerate(renderer.names)}
@@ -126,9 +138,23 @@ class TwinFootage(Footage):
         return self._renderer.seen(view, drawn)
 
 
-def not_promised(run: StoredRun, why: str) -> RunError:
+class NotPromisedError(RunError):
+    """A run of which a twin would promise too much. why : a clause."""
+
+    def __init__(self, run: str, why: str) -> None:
+        super().__init__(f"How far off run '{run}' is cannot be promised: {why}.", REMEDY)
+        self.why = why
+
+
+def not_promised(run: StoredRun, why: str) -> NotPromisedError:
     """The error for a run of which a twin would promise too much. why : a clause."""
-    return RunError(f"How far off run '{run.name}' is cannot be promised: {why}.", REMEDY)
+    return NotPromisedError(run.name, why)
+
+
+def stamp_of(run: InspectedRun) -> str:
+    """What changes with all that a run's twin is made of: its poses, footage, calibration and masks."""
+    inputs, track = digests(run.session, ("footage", "calibration", "masks")), reported(run.run)
+    return " ".join([track.name, track_digest(track), *(value[:12] for value in inputs.values())])
 
 
 def points_of(body: BodyModel) -> tuple[str, ...]:
@@ -152,35 +178,86 @@ def track_twin(run: InspectedRun, frames: range, progress: Progress) -> TwinErro
 
     Raises RunError where the masks lack too much of the body.
     """
-    record, body = run.run.record, run.body
-    poses = reported(run.run).poses[: len(frames)]
-    with ExitStack() as open_things:
-        own = open_things.enter_context(closing(run.session.footage()))
-        cameras = run.run.cameras()
-        backgrounds = Backgrounds(own)
-        faults = _measured(run, frames, poses, cameras, own, backgrounds, progress)
-        for one in faults.shares():
-            if one.holes + one.empty > MOST_MISSING:
-                raise not_promised(
-                    run.run,
-                    f"{100.0 * (one.holes + one.empty):.0f} % of the body are missing in the masks of {one.camera}, so"
-                    " that something hides it, or it is elsewhere",
-                )
-        pictures = [_empty_place(backgrounds, camera.name) for camera in cameras]
-        renderer, truth = _drawn(body, poses, cameras, pictures, record.fps, record.seed)
-        del backgrounds
-        footage = open_things.enter_context(closing(TwinFootage(own, renderer, frames.start, faults)))
-        twin = open_things.enter_context(_prepared(run, frames, footage, progress))
-        ahead = open_things.enter_context(ThreadPoolExecutor(1, thread_name_prefix="next-frame"))
-        problems = ProblemSource(
-            run.session, twin.body(), cameras, last=frames.stop, executor=ahead, footage=footage
+    with closing(Twins(run, frames, progress)) as twins:
+        return twins.track(progress)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwinCamera:
+    """A camera that films a twin. like : the run's camera whose empty place and mask faults it has."""
+
+    camera: Camera
+    like: str
+
+
+class Twins:
+    """A run's twins, which cameras that are not the run's may film as well: the same body, motion, person and mask
+    faults. Close it when done.
+    """
+
+    def __init__(self, run: InspectedRun, frames: range, progress: Progress) -> None:
+        """frames : of the run, each with a pose. What a progress raises ends it.
+
+        Raises RunError where the masks lack too much of the body.
+        """
+        self._run, self._frames = run, frames
+        body, poses, self._cameras = run.body, reported(run.run).poses[: len(frames)], run.run.cameras()
+        self._own = run.session.footage()
+        try:
+            backgrounds = Backgrounds(self._own)
+            self._faults = _measured(run, frames, poses, self._cameras, self._own, backgrounds, progress)
+            for one in self._faults.shares():
+                if one.holes + one.empty > MOST_MISSING:
+                    raise not_promised(
+                        run.run,
+                        f"{100.0 * (one.holes + one.empty):.0f} % of the body are missing in the masks of {one.camera},"
+                        " so that something hides it, or it is elsewhere",
+                    )
+            self._pictures = [_empty_place(backgrounds, camera.name) for camera in self._cameras]
+            self._surface, self.truth = _drawn(body, poses, self._cameras, self._pictures, run.run.record.fps)
+        except BaseException:
+            self._own.close()
+            raise
+
+    def close(self) -> None:
+        self._own.close()
+
+    def track(
+        self, progress: Progress, rig: Sequence[TwinCamera] | None = None, *, seed: int = 0
+    ) -> TwinErrors:
+        """Draw and track a twin. rig : cameras, the run's by default. seed : another one draws other random numbers."""
+        run, frames = self._run, self._frames
+        rig = rig or [TwinCamera(camera, camera.name) for camera in self._cameras]
+        own = [camera.name for camera in self._cameras]
+        like = [own.index(one.like) for one in rig]
+        cameras, seed = tuple(one.camera for one in rig), run.run.record.seed + SEED * (1 + seed)
+        renderer = _renderer(
+            cameras,
+            [self._pictures[at] for at in like],
+            *self._surface,
+            1.0 if is_person(run.body) else scale_of(run.body),
+            SAMPLES,
+            seed,
         )
-        with closing(problems):
+        sources = {one.name: one for one in self._own.source.cameras}
+        filmed = tuple(replace(sources[one.like], name=one.camera.name) for one in rig)
+        source = replace(self._own.source, cameras=filmed)
+        faults = self._faults.in_cameras(cameras, like)
+        with (
+            closing(TwinFootage(source, self._own.folder, renderer, frames.start, faults)) as footage,
+            _prepared(run, frames, cameras, footage, seed, progress) as twin,
+            ThreadPoolExecutor(1, thread_name_prefix="next-frame") as ahead,
+            closing(
+                ProblemSource(
+                    run.session, twin.body(), cameras, last=frames.stop, executor=ahead, footage=footage
+                )
+            ) as problems,
+        ):
             track_to_end(twin, problems, lambda done, total: progress("tracking the twin", done, total))
-        found = reported(twin).poses
-        errors = body_points(twin.body(), found) - truth
-        turns = joint_frames(twin.body(), found)[:, carriers_of(body), :, :3]
-    return TwinErrors(errors, turns, faults.shares())
+            found = reported(twin).poses
+            errors = body_points(twin.body(), found) - self.truth
+            turns = joint_frames(twin.body(), found)[:, carriers_of(run.body), :, :3]
+        return TwinErrors(errors, turns, self._faults.shares())
 
 
 def reported(run: StoredRun) -> Track:
@@ -215,27 +292,20 @@ def _measured(
 
 
 def _drawn(
-    body: BodyModel,
-    poses: Array,
-    cameras: tuple[Camera, ...],
-    pictures: list[Bytes],
-    fps: float,
-    seed: int,
-) -> tuple[RendererBefore, Array]:
-    """What draws a body in poses (F, D), and where its points then are, (F, M, 3) mm."""
-    truth, scale = body_points(body, poses), scale_of(body)
-    if is_person(body):
-        motion = person_of_poses(body, poses, fps)
-        markers, names = marker_motion(motion), points_of(body)
-        truth[:, [names.index(name) for name in markers.names]] = markers.positions
+    body: BodyModel, poses: Array, cameras: tuple[Camera, ...], pictures: list[Bytes], fps: float
+) -> tuple[tuple[Array, IntArray], Array]:
+    """The surface of a body in poses (F, D), as renderers take it, and where its points then are, (F, M, 3) mm."""
+    truth = body_points(body, poses)
+    if not is_person(body):
+        return body_pieces(body, poses, 1.0 / scale_of(body)), truth
+    motion = person_of_poses(body, poses, fps)
+    markers, names = marker_motion(motion), points_of(body)
+    truth[:, [names.index(name) for name in markers.names]] = markers.positions
 
-        def surface(girth: float) -> tuple[Array, IntArray]:
-            return piece_tables(motion, clothed_pieces(motion.skeleton, girth))
+    def surface(girth: float) -> tuple[Array, IntArray]:
+        return piece_tables(motion, clothed_pieces(motion.skeleton, girth))
 
-        tables, labels = surface(_girth(body, poses, cameras, pictures, surface))
-    else:
-        tables, labels = body_pieces(body, poses, 1.0 / scale)
-    return _renderer(cameras, pictures, tables, labels, scale, SAMPLES, seed + SEED), truth
+    return surface(_girth(body, poses, cameras, pictures, surface)), truth
 
 
 def _renderer(
@@ -287,26 +357,31 @@ def _girth(
 
 @contextmanager
 def _prepared(
-    run: InspectedRun, frames: range, footage: TwinFootage, progress: Progress
+    run: InspectedRun,
+    frames: range,
+    cameras: tuple[Camera, ...],
+    footage: TwinFootage,
+    seed: int,
+    progress: Progress,
 ) -> Generator[StoredRun]:
     """The twin as a run of its own, ready to be tracked, in a folder that is removed at the end."""
     record, body = run.run.record, run.body
     start = record.start_pose
     if record.subject_dimensions and start is not None:
-        body, start = _shaped(run, frames, footage, progress)
+        body, start = _shaped(run, frames, cameras, footage, progress)
     with tempfile.TemporaryDirectory(prefix="studio-twin-") as folder, run.run.results() as results:
         place = Path(folder) / "twin" / "runs" / "twin"
         place.mkdir(parents=True)
-        for part in (CAMERAS_NAME, BEHAVIOUR_NAME):
-            if (run.run.folder / part).exists():
-                shutil.copyfile(run.run.folder / part, place / part)
+        write_calibration(cameras, place / CAMERAS_NAME)
+        if (run.run.folder / BEHAVIOUR_NAME).exists():
+            shutil.copyfile(run.run.folder / BEHAVIOUR_NAME, place / BEHAVIOUR_NAME)
         if (run.run.folder / BODY_FOLDER).is_dir():
             shutil.copytree(run.run.folder / BODY_FOLDER, place / BODY_FOLDER)
         create_store(place)
         changed = msgspec.structs.replace(
             record,
             last=frames.stop,
-            seed=record.seed + SEED,
+            seed=seed,
             settings={**record.settings, **OWN_MASKS},
             dimensions=dict(body.dimensions),
             start_pose=start,
@@ -321,7 +396,11 @@ def _prepared(
 
 
 def _shaped(
-    run: InspectedRun, frames: range, footage: TwinFootage, progress: Progress
+    run: InspectedRun,
+    frames: range,
+    cameras: tuple[Camera, ...],
+    footage: TwinFootage,
+    progress: Progress,
 ) -> tuple[BodyModel, tuple[float, ...]]:
     """The body with the shape of the twin's first frames, as the run's own was fitted, and its start pose."""
     record = run.run.record
@@ -329,7 +408,7 @@ def _shaped(
     body = with_dimensions(run.body, record.subject_dimensions)
     recorded = settings_from_values(record.tracker, record.weighting, {**record.settings, **OWN_MASKS})
     rules = replace(default_settings(), evidence=recorded.evidence)
-    problems = ProblemSource(run.session, body, run.run.cameras(), footage=footage)
+    problems = ProblemSource(run.session, body, cameras, footage=footage)
     # The footage goes on; what the source has read of it is let go with the source.
     shape = shaped_body(
         body,

@@ -62,6 +62,7 @@ def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
         ("/behaviours", "Behaviours · Capture studio"),
         ("/reports", "Reports · Capture studio"),
         ("/arena", "Arena · Capture studio"),
+        ("/rig", "Where cameras should stand · Capture studio"),
         ("/guide", "Guide · Capture studio"),
     ],
 )
@@ -79,7 +80,7 @@ def test_every_page_is_put_together_whole(studio: Studio, address: str, title: s
         text.partition('class="places"')[2].partition("</nav>")[0],
     )
     assert [to for to, _ in places] == list(PLACES)
-    assert [to for to, mark in places if mark] == [address]
+    assert [to for to, mark in places if mark] == ([address] if address in PLACES else [])
     for asset in re.findall(r'(?:href|src)="(/assets/[^"]+)"', text):
         studio.get(asset)
 

@@ -143,6 +143,8 @@ def test_sessions_runs_results_and_events_can_be_seen(
         "/behaviours",
         "/reports",
         "/arena",
+        "/rig",
+        f"{run}/rig",
         "/scene/w/",
         "/api/sessions",
         run,

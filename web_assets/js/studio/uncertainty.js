@@ -27,10 +27,17 @@ async function begin() {
   }
 }
 
+/** The page on other cameras for the run. */
+const RigLink = () => html`<a
+  href=${`/rig?${new URLSearchParams({ session: follow("session"), run: follow("run") })}`}
+>
+  Where should cameras stand?
+</a>`;
+
 /** What starts it, or how far it is. */
 export function UncertaintyTools() {
   const job = held.about(keyOf({ session: follow("session"), run: follow("run") }));
-  if (readOnly) return null;
+  if (readOnly) return html`<${RigLink} />`;
   if (isGoing(job)) {
     const cancel = () => remove(`/api/uncertainty/${job.identifier}`).catch(complain);
     return html`<span class="hint" role="status">
@@ -39,13 +46,14 @@ export function UncertaintyTools() {
       <button type="button" class="quiet small" onClick=${cancel}>Cancel</button>`;
   }
   return html`<button
-    type="button"
-    class="small"
-    title="The run is drawn again and tracked, in the background: about twice as long as it took. It does not change."
-    onClick=${begin}
-  >
-    Measure how far off joints may be
-  </button>`;
+      type="button"
+      class="small"
+      title="The run is drawn again and tracked, in the background: about twice as long as it took. It does not change."
+      onClick=${begin}
+    >
+      Measure how far off joints may be
+    </button>
+    <${RigLink} />`;
 }
 
 /** Hear of such jobs; `ended()` is called when that of the shown run has ended. */
