@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 import click
 
 from studio.cli.output import MemberChoice, command, progress, shown_progress
-from studio.cli.reading import camera_numbers, chosen_knobs, frame_numbers, measured, place, places
+from studio.cli.reading import camera_numbers, chosen_knobs, frame_numbers, measured, numbers, place, places
 from studio.foundations.declaring import (
     PROGRESS,
     REQUIRED,
@@ -28,6 +28,7 @@ READERS: dict[Any, tuple[str, Callable[[Sequence[str], str], object]]] = {
     Mapping[str, int]: ("CAMERA=NUMBER", camera_numbers),
     Mapping[str, float]: ("NAME=MM", measured),
     Sequence[tuple[float, float]]: ("X,Y", places),
+    Sequence[float]: ("NUMBER", numbers),
 }
 """Types whose options are repeated, by what is written and how it is read."""
 SET = "changes"

@@ -39,6 +39,17 @@ def measured(words: Sequence[str], option: str) -> dict[str, float]:
     return _by_name(words, option, float, "Write a name and a number: {} RHip_RKnee=420.")
 
 
+def numbers(words: Sequence[str], option: str) -> tuple[float, ...]:
+    """Words as numbers. Raises SettingsError."""
+    try:
+        return tuple(float(word) for word in words)
+    except ValueError:
+        raise SettingsError(
+            f"'{option} {' '.join(words)}' is no number.",
+            f"Write it again for more: {option} 1000 {option} 2400.",
+        ) from None
+
+
 def place(word: str, option: str) -> tuple[float, float]:
     """X,Y as numbers. Raises FootageError."""
     try:

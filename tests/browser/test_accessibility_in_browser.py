@@ -36,6 +36,8 @@ PAGES = {
     "/gallery": ".gallery-card",
     "/reports": "#findings .lead",
     "/arena": "#findings .lead",
+    "/rig": ".nothing",
+    "/rig?session=walk&run=seen": ".rig-page .words",
     "/guide": "main",
     "/guide/verbs": "main",
 }

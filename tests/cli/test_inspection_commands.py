@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 from command_line import answer_of, call, refusal_of
+from toy_session import facing_camera, make_session, side_camera
 
 from studio.cli.inspection_commands import MOST_ROWS
 from studio.operations.inspecting import tables_csv
 from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
 
 
 @pytest.fixture(autouse=True)
@@ -82,6 +84,29 @@ def test_how_far_off_joints_may_be(tmp_path: Path) -> None:
     call("uncertainty", "toy", "whole", "--csv", tmp_path / "half_widths.csv")
     assert "within_50 [mm]" in (tmp_path / "half_widths.csv").read_text()
     assert answer_of("view", "toy", "whole", "--view", "uncertainty")["tables"] == told["tables"]
+
+
+def test_where_cameras_should_stand(tmp_path: Path) -> None:
+    refused = refusal_of("rig", "toy", "one")
+    assert "it has one camera, and a rig of one tells nothing of depth" in refused
+    make_session(Workspace().place_for("pair"), cameras=(facing_camera(), side_camera()))
+    call("track pair --particles 20 --layers 3 --set constraints=clamp --name whole")
+    words = ["rig", "pair", "whole"]
+    told = answer_of(*words, "--add", "-2500,-1500,0", "--best", "1", "--height", "0")
+    rigs = {row["rig"]: row for row in told["tables"]["rigs"]}
+    assert [*rigs] == ["as it is", "one more at (-2.50, -1.50, 0.00) m", "best 1 place beside"]
+    assert rigs["as it is"]["tracked"] == pytest.approx(rigs["as it is"]["predicted"])
+    assert rigs["best 1 place beside"]["tracked"] is None
+    assert told["notes"][0].startswith("Present rig, 2 cameras: ")
+    assert "(predicted)" in told["notes"][2]
+    said = " ".join(call(*words).output.split())
+    assert told["notes"][0] in said
+    assert "Places of the grid" in said
+    call(*words, "--csv", tmp_path / "rigs.csv")
+    assert "predicted [mm]" in (tmp_path / "rigs.csv").read_text()
+    assert "Camera 'cam9' is none of run 'whole'" in refusal_of(*words, "--move", "cam9=0,0,0")
+    assert "is no place" in refusal_of(*words, "--add", "0,0")
+    assert "'--height high' is no number" in refusal_of(*words, "--best", "1", "--height", "high")
 
 
 def test_a_line_break_in_a_run_s_record_begins_no_cell() -> None:

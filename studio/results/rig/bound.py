@@ -31,8 +31,6 @@ OFF_PX, OFF_MM, ALIKE_MM = 1.0, 10.0, 60.0
 """How far an outline is off: in a picture, and of clothes; over how much of it that is the same. At a person's size."""
 ROOM_MM, FREE_ANGLE = 300.0, 0.6
 """What is known beforehand: a body's place, and an angle (rad), to so much; at a person's size."""
-COVERED = 0.97
-"""Share of another limb's half width within which an outline is covered."""
 _SIDES = len(ALONG)
 _SHARES: Array = np.array([*ALONG, *ALONG, 0.0, 1.0])
 _ACROSS: Array = np.array([1.0] * _SIDES + [-1.0] * _SIDES + [0.0, 0.0])
@@ -164,7 +162,7 @@ def _covered(outline: Array, ends: Array, half: Array) -> Mask:
         share = np.clip(np.einsum("flsp,fp->fls", away, line) / square[:, None, None], 0.0, 1.0)
         near: Array = np.linalg.norm(away - share[..., None] * line[:, None, None], axis=-1)
         wide = half[:, limb, 0, None, None] + share * (half[:, limb, 1] - half[:, limb, 0])[:, None, None]
-        inside = near < COVERED * wide
+        inside = near < wide
         inside[:, limb] = False
         covered |= inside
     return covered

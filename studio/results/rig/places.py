@@ -18,10 +18,12 @@ Place = tuple[float, float, float]
 ALONG_SIDE = 11
 """Places of a grid along the longer side of the room, unless they are asked for closer."""
 MOST_PLACES = 600
-NEAREST = 0.5
+NEAREST = 0.75
 """Of the distance at which the nearest camera stands now: nearer to the subject's path is no place."""
 SEEN = 0.5
 """A place from which less of the body is in the picture is not chosen."""
+FARTHEST = 1e6
+"""Of a place from the origin, mm."""
 APART_HEIGHT = 250.0
 MOST_EXCHANGES = 3
 
@@ -61,8 +63,10 @@ def grid_of(
     """Places on a grid over the floor that the cameras and the subject's path, (F, 3), take up, at each height, and how
     far apart they are. heights : mm, those of the cameras by default.
 
-    Raises RunError for more than MOST_PLACES.
+    Raises RunError for more than MOST_PLACES, and for a height that is none.
     """
+    if wrong := [height for height in heights if not abs(height) <= FARTHEST]:
+        raise RunError(f"{wrong[0]:g} mm is no height.", "Write heights over the floor in mm, such as 2400.")
     centres = np.stack([camera.centre for camera in cameras])
     floor = np.concatenate([centres, path])[:, :2]
     low, high = floor.min(axis=0), floor.max(axis=0)
@@ -173,7 +177,7 @@ def parsed_place(text: str) -> Place:
         x, y, z = (float(part) for part in parts)
     except ValueError:
         x = y = z = math.nan
-    if not all(map(math.isfinite, (x, y, z))):
+    if not all(abs(one) <= FARTHEST for one in (x, y, z)):
         raise RunError(f"'{text[:60]}' is no place.", "Write X,Y,Z in mm, such as 2500,-1200,1800.")
     return (x, y, z)
 

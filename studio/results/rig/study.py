@@ -1,8 +1,9 @@
 """A run's rig and others beside it: what errors to expect of each, kept with the run, and why a run has none.
 
-The present rig's twin is tracked first. Its error of each point has two parts: the bias, which is taken to stay
-whatever the rig, and the scatter, which is taken to go with the bound (`bound.py`). So the present rig's prediction is
-what its twin showed, and other rigs' follow in seconds; on request they are drawn and tracked, too.
+The present rig's twin is tracked first. Where the bound (`bound.py`) says that a point is seen worse, its error is
+predicted to grow as the bound does; where it is seen better, its scatter is to shrink so, and its bias, mostly of
+clothes and flesh that are no cones, to stay. So the present rig's prediction is what its twin showed, and other rigs'
+follow in seconds; on request they are drawn and tracked, too.
 """
 
 import math
@@ -436,8 +437,9 @@ class _Asker:
 def _in_mm(bound: Array, present: RigErrors) -> Array:
     """Errors (…, M) that are expected where the bound is so far off. present : with its twin's errors."""
     measured, least = np.array(present.tracked_mm), np.maximum(present.bound_mm, 1e-9)
-    bias = np.minimum(np.array(present.bias_mm), measured)
-    return np.hypot(bias, np.sqrt(measured**2 - bias**2) * bound / least)
+    bias, times = np.minimum(np.array(present.bias_mm), measured), bound / least
+    better = np.hypot(bias, np.sqrt(measured**2 - bias**2) * times)
+    return np.where(times < 1.0, better, measured * times)
 
 
 def _figure(body: BodyModel) -> BodyFigure:
