@@ -25,7 +25,7 @@ from studio.operations.rigs import rig
 from studio.results.inspection.comparing import RunsCompared
 from studio.results.inspection.error_parts import ErrorSplit
 from studio.results.inspection.tables import Cell, Table, Viewed
-from studio.results.rig.study import RunRig, tables_of
+from studio.results.rig.study import RunRig
 from studio.results.uncertainty.half_widths import RunUncertainty
 
 MOST_ROWS = 40
@@ -97,7 +97,7 @@ def rig_command(call: Call, file: Path | None) -> dict[str, object]:
     known: RunRig = call()
     assert known.study is not None
     caption = inspected(call.given["run"]).caption()
-    tables = {one.name: one for one in tables_of(known.study)}
+    tables = {one.name: one for one in known.study.tables()}
     present = known.study.present.name
     own = [row for row in tables["joints"].rows if row[0] == present]
     best = sorted(tables["places"].rows, key=lambda row: row[-1] or len(tables["places"].rows))

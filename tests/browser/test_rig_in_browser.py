@@ -60,7 +60,7 @@ def test_the_rig_is_measured_and_the_job_found_again(window: StudioPage, studio:
     done(studio)
     study = studio.get(f"{RUN}/rig")["study"]
     assert len(study["rigs"]) == 1
-    row = page.locator(".rig-page table").last.locator("tbody tr")
+    row = page.locator("tr:has(input[name=rig])")
     assert row.count() == 1
     expect(row).to_contain_text(f"{study['rigs'][0]['tracked']:.1f}")
     assert page.locator(".rig-camera").count() == 4
@@ -120,7 +120,7 @@ def test_the_best_places_of_a_grid_are_shown_and_what_is_wrong_is_said(
     heights = page.get_by_label("Heights, m")
     heights.fill("high")
     page.get_by_role("button", name="Find them").click()
-    expect(page.get_by_role("alert")).to_contain_text("A height is no number")
+    expect(page.locator(".wrong")).to_contain_text("A height is no number")
     heights.fill("1.2 2.4")
     page.get_by_label("Cameras", exact=True).fill("2")
     page.get_by_role("button", name="Find them").click()
@@ -131,9 +131,10 @@ def test_the_best_places_of_a_grid_are_shown_and_what_is_wrong_is_said(
     shown = [one for one in study["places"] if one["place"][2] == height]
     assert page.locator(".rig-spot").count() == len(shown)
     chosen = [one["order"] for one in shown if one["order"]]
-    assert sorted(page.locator(".rig-spot text").all_inner_texts()) == sorted(map(str, chosen))
+    assert sorted(page.locator(".rig-spot text").all_text_contents()) == sorted(map(str, chosen))
     page.evaluate(USE_THEME, "dark")
-    page.screenshot(path=artefacts / "rig.png", full_page=True)
+    page.screenshot(path=artefacts / "rig.png")
+    page.locator(".pair").screenshot(path=artefacts / "rig-room.png")
     for theme in ("dark", "light"):
         page.evaluate(USE_THEME, theme)
         found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
@@ -141,7 +142,7 @@ def test_the_best_places_of_a_grid_are_shown_and_what_is_wrong_is_said(
         assert not grave, (theme, grave, [node["html"][:200] for one in found for node in one["nodes"]])
     page.set_viewport_size({"width": 390, "height": 800})
     page.wait_for_timeout(100)
-    page.screenshot(path=artefacts / "rig-390.png", full_page=True)
+    page.screenshot(path=artefacts / "rig-390.png")
     assert page.evaluate("document.querySelector('#content').scrollWidth <= innerWidth")
     page.set_viewport_size({"width": 1280, "height": 800})
     page.reload()

@@ -154,7 +154,11 @@ function Joints({ of, rig }) {
       <div class="scrolls" tabindex="0" role="group" aria-label="By joint">
         <table class="figures">
           <thead>
-            <tr><th>Joint</th><th>Error, mm</th><th>Against the present rig</th></tr>
+            <tr>
+              <th>Joint</th>
+              <th>Error, mm</th>
+              <th title="Against the rig as it is">Change, mm</th>
+            </tr>
           </thead>
           <tbody>
             ${of.points.map(
@@ -425,13 +429,13 @@ function Page() {
             ${sentences.map((one) => html`<li>${one}</li>`)}
           </ul>`
     }
-    ${known.value === null ? html`<${Failure} error=${failed.value} />` : html`<${Ask} of=${holds} />`}
     ${
       holds &&
       rig &&
       html`<div class="pair"><${Room} of=${holds} /><${Joints} of=${holds} rig=${rig} /></div>
         <${Rigs} of=${holds} />`
     }
+    ${known.value === null ? html`<${Failure} error=${failed.value} />` : html`<${Ask} of=${holds} />`}
   </div>`;
 }
 

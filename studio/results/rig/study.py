@@ -210,6 +210,10 @@ class RigStudy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def present(self) -> RigErrors:
         return self.rigs[0]
 
+    def tables(self) -> tuple[Table, ...]:
+        """Rigs, their joints, the places of the grid, the cameras of rigs with new ones."""
+        return _tables_of(self)
+
 
 _RECORD = RecordFile(
     RigStudy,
@@ -585,8 +589,7 @@ TABLES = (
 )
 
 
-def tables_of(study: RigStudy) -> tuple[Table, ...]:
-    """A study as tables: rigs, their joints, the places of the grid, the cameras of rigs with new ones."""
+def _tables_of(study: RigStudy) -> tuple[Table, ...]:
     rows: dict[str, list[Row]] = {
         "rigs": [_row(one, study.points) for one in study.rigs],
         "joints": [

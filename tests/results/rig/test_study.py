@@ -21,7 +21,6 @@ from studio.results.rig.study import (
     RigStudy,
     kept_rig,
     study_rig,
-    tables_of,
 )
 from studio.results.uncertainty.mask_faults import MaskFaults
 from studio.results.uncertainty.twin import TwinCamera, TwinErrors, points_of, reported
@@ -109,7 +108,7 @@ def test_rigs_are_predicted_without_a_twin_and_kept_beside_one_another(
     assert all(one.predicted < present for one in study.places if one.sees > 0.9)
     assert [one.name for one in rigs[changed].cameras] == ["cam1-moved", "cam2", "cam3", "cam4", "new1"]
     assert [one.is_new for one in rigs[changed].cameras] == [True, False, False, False, True]
-    tables = {one.name: one for one in tables_of(study)}
+    tables = {one.name: one for one in study.tables()}
     assert len(tables["joints"].rows) == len(rigs) * len(study.points)
     assert tables["rigs"].records()[1]["tracked"] is None
     assert {row["rig"] for row in tables["cameras"].records()} == {"best 2 places beside", changed}
