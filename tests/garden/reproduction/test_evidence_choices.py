@@ -138,7 +138,7 @@ def test_a_threshold_of_other_clips_must_catch_losses_without_false_alarms() -> 
     name, lost, false = (
         "caillette-loss-test",
         "lost poses that are called lost",
-        "true poses that are called lost",
+        "true poses that are not called lost",
     )
     good = concluded(name, qualities(-2.0))
     assert good.verdict == "reproduced"
