@@ -14,13 +14,17 @@ from studio.body.motion_files.trc import read_trc, write_trc
 from studio.foundations.errors import SettingsError, TruthError
 from studio.garden.reproduction.caillette import training_set
 from studio.garden.reproduction.caillette.following import (
+    FITTED,
+    PLACED,
     Follow,
     Followed,
     Known,
     Recovering,
     known_problems,
     measure,
+    placed_quality,
     problems,
+    taught_blobs,
 )
 from studio.garden.reproduction.caillette.training_set import (
     POINTING,
@@ -33,6 +37,7 @@ from studio.garden.reproduction.caillette.training_set import (
 from studio.garden.reproduction.caillette.true_motion import joint_errors, true_motion
 from studio.results.comparison.footage_cache import FootageCache
 from studio.runs.behaviour_models import fitting
+from studio.runs.live.following import Following
 from studio.runs.search_space import search_space, session_sigma
 from studio.search.behaviour.feature_space import feature_space
 from studio.search.likelihood.blobs import BlobFrameLikelihood
@@ -285,3 +290,46 @@ def test_blobs_that_fit_poorly_are_lost(cache) -> None:
     for pose, lost in ((truth.poses[1], False), (away, True)):
         result = SimpleNamespace(estimate=SimpleNamespace(pose=pose))
         assert following._is_lost(problem, before, result) is lost
+    # A threshold of one's own, by fitted blobs or by those that the pose places: turned round, blobs fit the hull
+    # again, and where the pose puts them they do not.
+    turned = truth.poses[1].copy()
+    turned[:2] += 150.0
+    right, wrong = (placed_quality(problem, pose, memory) for pose in (truth.poses[1], turned))
+    fitted = [problem.expecting(pose[None], memory).quality for pose in (truth.poses[1], turned)]
+    assert right - wrong > 1.0
+    assert right - wrong > 3.0 * abs(fitted[0] - fitted[1])
+    result = SimpleNamespace(estimate=SimpleNamespace(pose=turned))
+    for by, below, lost in (
+        (PLACED, -0.5 * (right + wrong), True),
+        (PLACED, -wrong + 1.0, False),
+        (FITTED, -fitted[1] - 0.1, True),
+        (FITTED, -fitted[1] + 0.1, False),
+    ):
+        own = Recovering(settings, space, before, 0, lost_by=by, lost_below=below)
+        assert own._is_lost(problem, before, result) is lost, (by, below)
+
+
+def test_blobs_are_taught_from_the_true_poses_before_the_first_frame(cache) -> None:
+    knobs = {"particles": 40, **COARSE, "blob_learning": 2}
+    wanted = Follow("walk", "behaviour", "blobs", 1, LAST, knobs, training=WALK, taught=True)
+    session = cache.session("walk")
+    truth, settings = true_motion(cache, session, LAST), wanted.settings()
+    memory = taught_blobs(problems(cache, session, settings, LAST), truth.poses, settings)
+    assert set(memory) == {"blobs"}
+    seen = []
+    known = Following.step
+
+    def step(self, frame, problem, picture=None):
+        seen.append(dict(self.carried.memory))
+        return known(self, frame, problem, picture)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Following, "step", step)
+        measure(wanted.plain(), cache)
+    assert np.array_equal(seen[0]["blobs"], memory["blobs"], equal_nan=True)
+    assert all(np.array_equal(one["blobs"], memory["blobs"], equal_nan=True) for one in seen)
+    plain = dataclasses.replace(wanted, taught=False).plain()
+    assert "taught" not in plain
+    assert "lost_by" not in plain
+    assert "lost_below" not in plain
+    assert Follow.of_plain(wanted.plain()) == wanted
