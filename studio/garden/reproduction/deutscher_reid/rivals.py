@@ -66,13 +66,13 @@ from studio.search.trackers.tracker import FilterState, FrameLikelihood, Particl
 # Dimensions.
 
 ARM, JOINTS = "planar_arm4", 4
-ARM_LAYERS, ARM_RUNS = 6, 3
+ARM_LAYERS, ARM_RUNS = 6, 9
 ONE_WEIGHTING, PARTITIONED, ANNEALED = (
     "particle filter",
     "partitioned sampling, a partition",
     "annealed, a layer",
 )
-LADDER = sizes(4, 16_384, 1)
+LADDER = sizes(4, 16_384)
 QUICK_LADDER = sizes(4, 4096, 1)
 SURVIVAL = 0.5
 ONE_JOINT = 0.1
