@@ -16,6 +16,7 @@ const SIGNS = {
 };
 const FOLDED_ROWS = 14;
 const WIDE_COLUMNS = 9;
+const MOST_OPEN = 4;
 
 const disposals = new WeakMap();
 
@@ -228,6 +229,7 @@ function section(experiment, echarts, charts) {
       ),
       badge(experiment.verdict, experiment.firm),
     ),
+    refutations(experiment),
     element(
       "div",
       { className: "findings-words" },
@@ -261,6 +263,22 @@ function section(experiment, echarts, charts) {
   for (const table of experiment.tables) made.append(tableElement(table));
   if (Object.keys(experiment.settings).length) made.append(settings(experiment));
   return made;
+}
+
+/** What would refute the claim, by number; nothing for comparisons, which claim nothing. */
+function refutations(experiment) {
+  const judged = experiment.numbers.filter((number) => number.refuted);
+  if (!judged.length) return null;
+  return element(
+    "details",
+    { className: "findings-refuted", open: judged.length <= MOST_OPEN },
+    element("summary", {}, "What would refute this"),
+    element(
+      "ul",
+      {},
+      ...judged.map((number) => element("li", {}, `${number.name}: where ${number.refuted}`)),
+    ),
+  );
 }
 
 const isWide = (chart, count) =>

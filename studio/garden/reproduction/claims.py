@@ -21,6 +21,7 @@ from studio.results.comparison.statistics import (
     equal_to,
     number,
     ratio_number,
+    refuted_where,
     sign_test,
     verdict_of,
 )
@@ -53,7 +54,9 @@ def share(name: str, held: Iterable[bool], paper: float | None = 1.0) -> Number:
         verdict = "not reproduced" if fewer <= ONE_SIDED_P else "undecided"
         verdict = "reproduced" if more <= ONE_SIDED_P else verdict
     low, high = float(interval.low), float(interval.high)
-    return Number(name, holds / count, low, high, "of 1", paper, "", count, verdict)
+    side = "fewer" if paper is None or paper > HALF else "more"
+    refuted = "" if paper is None else f"so in significantly {side} than half of the seeds"
+    return Number(name, holds / count, low, high, "of 1", paper, "", count, verdict, refuted)
 
 
 def percent(name: str, held: Iterable[bool], least: float | None = None) -> Number:
@@ -68,8 +71,8 @@ def percent(name: str, held: Iterable[bool], least: float | None = None) -> Numb
     outer, inner = (test.proportion_ci(level, method="exact") for level in (LEVEL, ONE_SIDED))
     low, high = 100.0 * float(outer.low), 100.0 * float(outer.high)
     tested = 100.0 * float(inner.low), 100.0 * float(inner.high)
-    verdict = verdict_of((low, high), tested, least, "higher")
-    return Number(name, 100.0 * holds / count, low, high, "%", least, "higher", count, verdict)
+    verdict, refuted = verdict_of((low, high), tested, least, "higher"), refuted_where(least, "higher")
+    return Number(name, 100.0 * holds / count, low, high, "%", least, "higher", count, verdict, refuted)
 
 
 def ratio(name: str, ours: Sequence[float], theirs: Sequence[float], claim: str = "") -> Number:
@@ -103,18 +106,20 @@ def beyond(number: Number, bound: float, side: str) -> Number:
     """The number with the verdict on the claim that it is lower (or higher) than a bound: reproduced where the whole
     interval is, not reproduced where none of it is by more than the margin of equality, else undecided.
     """
-    if not (math.isfinite(number.low) and math.isfinite(number.high)):
-        return replace(number, better=side, verdict="not reproduced")
     lower_end, upper_end = equal_to(bound)
+    end = f"above {lower_end:.3g}" if side == LOWER else f"below {upper_end:.3g}"
+    refuted = f"the whole interval lies {end}"
+    if not (math.isfinite(number.low) and math.isfinite(number.high)):
+        return replace(number, better=side, verdict="not reproduced", refuted=refuted)
     shown = number.high < bound if side == LOWER else number.low > bound
     denied = number.low >= lower_end if side == LOWER else number.high <= upper_end
     verdict = "reproduced" if shown else "not reproduced" if denied else "undecided"
-    return replace(number, better=side, verdict=verdict)
+    return replace(number, better=side, verdict=verdict, refuted=refuted)
 
 
 def beside(number: Number) -> Number:
     """The number beside the paper's, without a verdict: no claim rests on it."""
-    return replace(number, verdict="answered")
+    return replace(number, verdict="answered", refuted="")
 
 
 def geometric_mean(values: Any, axis: int = -1) -> Any:  # noqa: ANN401 - what NumPy's own mean takes and gives

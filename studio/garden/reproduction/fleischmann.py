@@ -204,7 +204,8 @@ def _figs_4_5(groups: Groups) -> Iterator[Part]:
     if any(lost[20]):
         yield ratio(name, lost[60], lost[20], LOWER)
     else:
-        yield Number(name, nan, nan, nan, "×", None, "lower", len(lost[20]), "not reproduced")
+        refuted = "no limb is lost at 20 frames a second"
+        yield Number(name, nan, nan, nan, "×", None, "lower", len(lost[20]), "not reproduced", refuted)
     again = [float(np.mean([spell.found_again for spell in run])) for run in by_run[20] if run]
     if again:
         back = number("spells that end with the limb found again, 20 frames a second", again, "of all")

@@ -73,7 +73,7 @@ class Number:
     ours : over all seeds; low, high : its bootstrap 95 % interval over seeds. paper : None where the paper
     prints none. better : "lower" or "higher" if a difference to that side is an improvement, "" if not. seeds :
     their number. verdict : one of VERDICTS, by the rule of `results.comparison.statistics`; "answered" where no claim
-    rests on the number.
+    rests on the number. refuted : what would make it "not reproduced", a clause; "" where nothing does.
     """
 
     name: str
@@ -85,6 +85,7 @@ class Number:
     better: str = ""
     seeds: int = 0
     verdict: str = "answered"
+    refuted: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,7 +85,9 @@ def number(
     low, high = bootstrap_interval(kept, statistic)
     tested = (low, high) if paper is None else bootstrap_interval(kept, statistic, ONE_SIDED)
     verdict = verdict_of((low, high), tested, paper, better)
-    return Number(name, ours, low, high, unit, paper, better, len(kept), verdict)
+    return Number(
+        name, ours, low, high, unit, paper, better, len(kept), verdict, refuted_where(paper, better)
+    )
 
 
 def ratio_number(
@@ -107,7 +109,8 @@ def ratio_number(
     low, high = ratio_interval(first, second)
     tested = (low, high) if paper is None else ratio_interval(first, second, ONE_SIDED)
     verdict = verdict_of((low, high), tested, paper, better)
-    return Number(name, value, low, high, unit, paper, better, len(first), verdict)
+    refuted = refuted_where(paper, better)
+    return Number(name, value, low, high, unit, paper, better, len(first), verdict, refuted)
 
 
 def equal_to(value: float) -> tuple[float, float]:
@@ -136,6 +139,22 @@ def verdict_of(
     if (least >= lower_end or better == "lower") and (most <= upper_end or better == "higher"):
         return "reproduced"
     return "undecided" if low <= paper <= high else "not reproduced"
+
+
+def refuted_where(paper: float | None, better: str = "") -> str:
+    """What of the interval makes the verdict "not reproduced", a clause; "" without a paper's value."""
+    if paper is None:
+        return ""
+    lower_end, upper_end = equal_to(paper)
+    match better:
+        case "lower":
+            return f"the interval lies above {paper:.4g} and reaches beyond {upper_end:.3g}"
+        case "higher":
+            return f"the interval lies below {paper:.4g} and reaches below {lower_end:.3g}"
+        case _:
+            return (
+                f"the interval leaves {paper:.4g} out and reaches beyond {lower_end:.3g} or {upper_end:.3g}"
+            )
 
 
 def overall(verdicts: Iterable[str]) -> str:

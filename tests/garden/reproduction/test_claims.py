@@ -7,9 +7,19 @@ import numpy as np
 import pytest
 
 import studio.garden.reproduction
-from studio.garden.reproduction.claims import EQUAL, FEWEST_SEEDS, LOWER, NO_WORSE, percent, ratio, saved
+from studio.garden.reproduction.claims import (
+    EQUAL,
+    FEWEST_SEEDS,
+    LOWER,
+    NO_WORSE,
+    beside,
+    percent,
+    ratio,
+    saved,
+    share,
+)
 from studio.garden.reproduction.experiment import TABLE, Experiment
-from studio.results.comparison.statistics import number
+from studio.results.comparison.statistics import ONE_SIDED, bootstrap_interval, number
 from studio.results.comparison.trials import Scale
 
 THEIRS = np.random.default_rng(7).normal(30.0, 0.5, 10)
@@ -117,3 +127,38 @@ def is_one_sided(call: ast.Call) -> bool:
     names = ("name", "values", "unit", "paper", "better", "statistic")
     given |= set(names[: len(call.args)])
     return {"paper", "better"} <= given
+
+
+def test_each_claim_says_what_would_refute_it() -> None:
+    said = {
+        "holds": share("holds", [True] * 6),
+        "does not": share("does not", [False] * 6, 0.0),
+        "equal": ratio("equal", [1.0, 1.1], [1.0, 1.0], EQUAL),
+        "no worse": ratio("no worse", [1.0, 1.1], [1.0, 1.0], NO_WORSE),
+        "lower": ratio("lower", [1.0, 1.1], [2.0, 2.0], LOWER),
+        "least": percent("least", [True, True], 80.0),
+    }
+    assert {name: number.refuted for name, number in said.items()} == {
+        "holds": "so in significantly fewer than half of the seeds",
+        "does not": "so in significantly more than half of the seeds",
+        "equal": "the interval leaves 1 out and reaches beyond 0.909 or 1.1",
+        "no worse": "the interval lies above 1 and reaches beyond 1.1",
+        "lower": "the whole interval lies above 0.909",
+        "least": "the interval lies below 80 and reaches below 72.7",
+    }
+    assert beside(said["lower"]).refuted == ""
+    assert ratio("without a claim", [1.0], [1.0]).refuted == ""
+
+
+@pytest.mark.parametrize("values", [(1.3, 1.4, 1.35), (0.8, 1.3, 1.0), (0.5, 0.6, 0.55), (1.0, 1.01, 0.99)])
+@pytest.mark.parametrize("better", ["", "lower", "higher"])
+def test_what_is_said_to_refute_does(values: tuple[float, ...], better: str) -> None:
+    found = number("size", values * 4, "mm", 1.0, better)
+    least, most = bootstrap_interval(values * 4, level=ONE_SIDED)
+    beyond_margin = {"lower": most > 1.1, "higher": least < 1 / 1.1}.get(
+        better, most > 1.1 or least < 1 / 1.1
+    )
+    left_out = {"lower": found.low > 1.0, "higher": found.high < 1.0}.get(
+        better, not found.low <= 1.0 <= found.high
+    )
+    assert (found.verdict == "not reproduced") == (beyond_margin and left_out)
