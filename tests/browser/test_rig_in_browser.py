@@ -92,10 +92,11 @@ def test_a_camera_is_moved_with_keys_and_the_mouse_and_one_is_added(
     moved.focus()
     moved.press("Shift+ArrowUp")
     expect(page.get_by_label("cam1: y, m", exact=True)).to_have_value(f"{(y + 500) / 1000:.2f}")
+    # Where it stays once the page has scrolled to it.
+    moved.locator("circle").hover()
     box = moved.locator("circle").bounding_box()
     assert box is not None
     before = field.input_value()
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
     page.mouse.move(box["x"] - 60, box["y"] + 10, steps=4)
     page.mouse.up()
