@@ -25,7 +25,7 @@ def rig(
 ) -> RunRig:
     """Say where cameras should stand: the errors to expect of a run's joints with other cameras than its own.
 
-    The run is drawn again and tracked, once, which takes about twice as long as the run took. What other rigs' errors
+    The run is drawn again and tracked, once, which takes two to four times as long as the run took. What other rigs' errors
     would be is predicted from that and from what their cameras would see of the limbs, in seconds; with `--twins` each
     of them is drawn and tracked as well, as long again for each. All of it is kept with the run as it comes, so what
     Ctrl-C ends goes on from there.

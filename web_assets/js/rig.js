@@ -306,7 +306,7 @@ function Ask({ of }) {
   if (!of)
     return html`<section class="card-box">
       <p class="hint">
-        The run is drawn again and tracked, in the background: about twice as long as it took. Then
+        The run is drawn again and tracked, in the background: two to four times as long as it took. Then
         other rigs are predicted in seconds. The run does not change.
       </p>
       <${Failure} error=${wrong} />
@@ -323,7 +323,7 @@ function Ask({ of }) {
         withTwins.value = isOn;
       }}
     >
-      Also draw and track them: surer, and for each about twice as long as the run took
+      Also draw and track them: surer, and for each two to four times as long as the run took
     </${Check}>
     <fieldset>
       <legend>Leave one out</legend>
