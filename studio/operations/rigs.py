@@ -25,10 +25,10 @@ def rig(
 ) -> RunRig:
     """Say where cameras should stand: the errors to expect of a run's joints with other cameras than its own.
 
-    The run is drawn again and tracked, once, which takes two to four times as long as the run took. What other rigs' errors
-    would be is predicted from that and from what their cameras would see of the limbs, in seconds; with `--twins` each
-    of them is drawn and tracked as well, as long again for each. All of it is kept with the run as it comes, so what
-    Ctrl-C ends goes on from there.
+    The run is drawn again and tracked, once, which takes two to four times as long as the run took. What other rigs'
+    errors would be is predicted from that and from what their cameras would see of the limbs, in seconds; with
+    `--twins` each of them is drawn and tracked as well, as long again for each. All of it is kept with the run as it
+    comes, so what Ctrl-C ends goes on from there.
 
     Raises RunError for a run that says nothing of its rig, for a camera or a place that is none, and for a grid from
     which too few see the body.
