@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -274,3 +275,18 @@ def test_the_twin_confirms_that_side_by_side_cameras_gain_most_from_one_at_right
     assert present.tracked is not None
     assert right.tracked < 0.8 * near.tracked
     assert right.tracked < 0.8 * present.tracked
+
+
+@pytest.mark.slow
+def test_the_twin_confirms_that_the_camera_is_missed_most_that_alone_sees_the_upper_body(
+    track: Callable[..., InspectedRun],
+) -> None:
+    down = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.35], [0.0, 0.0, 0.0]])
+    *legs, whole = ring_of_cameras(4)
+    lower = tuple(replace(one, matrix=one.matrix - one.height * down) for one in legs)
+    run = track((*lower, whole), particles=150, layers=6)
+    study_rig(run, RigRequest(leave_out=True, twins=True), no_progress)
+    rigs = rigs_of(run)
+    without = [rigs[f"without cam{number}"] for number in range(1, 5)]
+    assert max(without, key=lambda one: one.predicted).name == "without cam4"
+    assert max(without, key=lambda one: one.tracked or 0.0).name == "without cam4"
