@@ -125,7 +125,7 @@ def test_the_best_places_of_a_grid_are_shown_and_what_is_wrong_is_said(
     heights.fill("1.2 2.4")
     page.get_by_label("Cameras", exact=True).fill("2")
     page.get_by_role("button", name="Find them").click()
-    page.get_by_label("best 2 places beside", exact=True).wait_for()
+    page.get_by_label("best 2 places beside the present cameras", exact=True).wait_for()
     until(page, lambda: page.locator(".rig-spot").count() > 10)
     study = studio.get(f"{RUN}/rig")["study"]
     height = float(page.get_by_label("Height of the places").input_value())

@@ -94,9 +94,13 @@ def test_where_cameras_should_stand(tmp_path: Path) -> None:
     words = ["rig", "pair", "whole"]
     told = answer_of(*words, "--add", "-2500,-1500,0", "--best", "1", "--height", "0")
     rigs = {row["rig"]: row for row in told["tables"]["rigs"]}
-    assert [*rigs] == ["as it is", "one more at (-2.50, -1.50, 0.00) m", "best 1 place beside"]
+    assert [*rigs] == [
+        "as it is",
+        "one more at (-2.50, -1.50, 0.00) m",
+        "best 1 place beside the present cameras",
+    ]
     assert rigs["as it is"]["tracked"] == pytest.approx(rigs["as it is"]["predicted"])
-    assert rigs["best 1 place beside"]["tracked"] is None
+    assert rigs["best 1 place beside the present cameras"]["tracked"] is None
     assert told["notes"][0].startswith("Present rig, 2 cameras: ")
     assert "(predicted)" in told["notes"][2]
     said = " ".join(call(*words).output.split())

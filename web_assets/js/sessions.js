@@ -80,6 +80,8 @@ export const setupPath = (entry) => `/way?session=${encodeURIComponent(entry.nam
  */
 export const studioPath = (session, run = "", more = {}) =>
   `/?${new URLSearchParams(Object.entries({ session, ...(run ? { run } : {}), ...more }).map(([name, value]) => [name, String(value)]))}`;
+/** The page on other cameras for a run. @param {string} session @param {string} run */
+export const rigPath = (session, run) => `/rig?${new URLSearchParams({ session, run })}`;
 /** What a session that cannot be tracked yet says of itself. */
 export const lacks = (entry) =>
   ({ footage: "no footage yet", calibration: "not calibrated yet" })[entry.next_step] ?? "";

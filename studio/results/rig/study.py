@@ -426,7 +426,8 @@ class _Asker:
         )
         kept = [] if request.instead else [TwinCamera(one, one.name) for one in self.cameras]
         rig = [*kept, *self._new([places[at] for at in chosen.chosen])]
-        name = f"best {counted(request.best, 'place')} {'instead' if request.instead else 'beside'}"
+        where = "instead of" if request.instead else "beside"
+        name = f"best {counted(request.best, 'place')} {where} the present cameras"
         return name, rig, grid, spacing
 
     def bound(self, name: str, kind: str, rig: Sequence[TwinCamera]) -> RigErrors:

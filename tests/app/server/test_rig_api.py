@@ -55,7 +55,7 @@ def test_a_rig_is_studied_in_a_job_that_is_found_again(
     assert present["tracked"] == pytest.approx(10.0 * np.sqrt(3.0))
     assert (added["kind"], added["tracked"]) == ("changed", None)
     assert added["cameras"][2]["place"] == pytest.approx([0.0, 4000.0, 1500.0])
-    assert best["name"] == "best 1 place beside"
+    assert best["name"] == "best 1 place beside the present cameras"
     assert [one["order"] for one in known["study"]["places"] if one["order"]] == [1]
     for wrong in ({"best": 13}, {"add": ["0,0"]}, {"move": ["cam1"]}, {"spacing": 0}, {"frames": 3}):
         studio.post(f"{RUN}/rig", wrong, code=422)

@@ -95,11 +95,11 @@ def test_rigs_are_predicted_without_a_twin_and_kept_beside_one_another(
     rigs = rigs_of(own)
     changed = "cam1 to (0.00, -3.50, 1.50) m and one more at (0.00, 3.40, 1.50) m"
     without = [f"without cam{number}" for number in range(1, 5)]
-    assert [*rigs] == [PRESENT, *without, "best 2 places beside", changed]
+    assert [*rigs] == [PRESENT, *without, "best 2 places beside the present cameras", changed]
     present = rigs[PRESENT].predicted
     assert all(rigs[name].predicted > present for name in without)
     assert all(rigs[name].tracked is None for name in (*without, changed))
-    best = rigs["best 2 places beside"]
+    best = rigs["best 2 places beside the present cameras"]
     assert best.predicted < present
     study = study_of(own)
     chosen = {one.order: one for one in study.places if one.order}
@@ -112,7 +112,10 @@ def test_rigs_are_predicted_without_a_twin_and_kept_beside_one_another(
     tables = {one.name: one for one in study.tables()}
     assert len(tables["joints"].rows) == len(rigs) * len(study.points)
     assert tables["rigs"].records()[1]["tracked"] is None
-    assert {row["rig"] for row in tables["cameras"].records()} == {"best 2 places beside", changed}
+    assert {row["rig"] for row in tables["cameras"].records()} == {
+        "best 2 places beside the present cameras",
+        changed,
+    }
 
 
 def test_a_whole_rig_instead_has_other_cameras_alone(
@@ -120,7 +123,7 @@ def test_a_whole_rig_instead_has_other_cameras_alone(
 ) -> None:
     tracked = names_tracked(monkeypatch)
     study_rig(own, RigRequest(best=3, instead=True, twins=True, lens="cam2", heights=[1500.0]), no_progress)
-    rig = rigs_of(own)["best 3 places instead"]
+    rig = rigs_of(own)["best 3 places instead of the present cameras"]
     assert tracked == ["new1 new2 new3"]
     assert {one.like for one in rig.cameras} == {"cam2"}
     assert [one.place[2] for one in rig.cameras] == pytest.approx([1500.0] * 3)

@@ -4,7 +4,7 @@ import { fetchJson, patch, readOnly, runPath } from "../api.js";
 import { openForm } from "./dialogs.js";
 import { complain, say } from "../messages.js";
 import { goTo, limbGroup, range, select } from "../selection.js";
-import { openSession, setupPath } from "../sessions.js";
+import { openSession, rigPath, setupPath } from "../sessions.js";
 import { get, set } from "../state.js";
 import { useTheme } from "../theme.js";
 import { chooseFormat } from "./exporting.js";
@@ -198,10 +198,20 @@ function pages() {
       else go(link.href);
     },
   }));
-  const session = get("session");
-  if (!session || readOnly) return own;
-  const words = `Guided set-up of ${session}`;
-  return [...own, { kind: "Page", words, more: "", act: () => go(setupPath({ name: session })) }];
+  const [session, run] = [get("session"), get("run")];
+  const page = (/** @type {string} */ words, /** @type {string} */ address) => ({
+    kind: "Page",
+    words,
+    more: "",
+    act: () => go(address),
+  });
+  return [
+    ...own,
+    ...(run ? [page("Where should cameras stand?", rigPath(session, run))] : []),
+    ...(session && !readOnly
+      ? [page(`Guided set-up of ${session}`, setupPath({ name: session }))]
+      : []),
+  ];
 }
 
 function doings() {

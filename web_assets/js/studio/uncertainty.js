@@ -5,6 +5,7 @@ import { post, readOnly, remove, runPath } from "../api.js";
 import { dotted } from "../elements.js";
 import { isGoing, standing, timeLeft } from "../jobs.js";
 import { complain } from "../messages.js";
+import { rigPath } from "../sessions.js";
 import { get } from "../state.js";
 import { follow, html } from "./component.js";
 import { heldJobs } from "./held_jobs.js";
@@ -29,7 +30,7 @@ async function begin() {
 
 /** The page on other cameras for the run. */
 const RigLink = () => html`<a
-  href=${`/rig?${new URLSearchParams({ session: follow("session"), run: follow("run") })}`}
+  href=${rigPath(follow("session"), follow("run"))}
 >
   Where should cameras stand?
 </a>`;
