@@ -143,6 +143,8 @@ JOBS: tuple[JobKind[Any], ...] = (
     export_routes.EXPORT,
     COURSE,
     view_routes.SEEDS,
+    view_routes.SPLIT,
+    view_routes.UNCERTAINTY,
     rig_routes.RIG,
     COMPARISON,
     LEARNING,

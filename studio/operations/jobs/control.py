@@ -76,13 +76,24 @@ class StudioControl:
     # ------------------------------------------------------------------ asking
 
     def send(self, command: commands.Command) -> None:
-        """Post a command; an `Acknowledged` event follows. One that names its run revives a process that was lost.
+        """Post a command; an `Acknowledged` event follows. One that names its run revives a process that was lost, also
+        one that dies just then.
 
         Raises ProcessDiedError.
         """
-        self._post(command)
+        process = self._post(command)
+        if process is not None and command.run:
+            with self._reviving:
+                if self._process is process:
+                    self.restart(resume=False)
+            process = self._post(command)
+        if process is not None:
+            raise _died_before(command)
 
-    def _post(self, command: commands.Command, answer: Future[Acknowledged] | None = None) -> None:
+    def _post(
+        self, command: commands.Command, answer: Future[Acknowledged] | None = None
+    ) -> OwnedProcess | None:
+        """None once a process has the command; else the process that died before."""
         if command.run:
             with self._reviving:
                 # Whoever comes second finds it revived.
@@ -96,7 +107,11 @@ class StudioControl:
             # What waits for an answer waits for this process's.
             if answer is not None:
                 self._answers[command.identifier] = answer
-        process.send(command)
+        try:
+            process.send(command)
+        except ProcessDiedError:
+            return process
+        return None
 
     def request(self, command: commands.Command, timeout: float = ANSWER_SECONDS) -> Acknowledged:
         """Post a command and wait until it is acknowledged.
@@ -106,15 +121,14 @@ class StudioControl:
         """
         answer: Future[Acknowledged] = Future()
         try:
-            self._post(command, answer)
+            if self._post(command, answer) is not None:
+                raise _died_before(command)
             event = answer.result(timeout)
         except TimeoutError:
             raise RunError(
                 f"The tracking process did not answer '{type(command).__name__}'.",
                 "Wait until it has compiled, or restart it.",
             ) from None
-        except ProcessDiedError:
-            raise _died_before(command) from None
         finally:
             with self._lock:
                 self._answers.pop(command.identifier, None)

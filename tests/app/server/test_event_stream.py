@@ -5,6 +5,7 @@ import json
 import math
 import queue
 import re
+import sys
 import threading
 
 import numpy as np
@@ -20,7 +21,7 @@ from studio.app.server.event_encoding import key_of, message_of
 from studio.app.server.event_stream import LIMIT, EventStream, Watcher, _send_all
 from studio.app.server.subject_routes import SUBJECT
 from studio.operations.jobs.events import Acknowledged, FrameFinished, LayerFinished, LogLine, SettingsApplied
-from studio.operations.jobs.job_runner import Job
+from studio.operations.jobs.job_runner import Job, JobKind
 from studio.operations.stored_frames import effective_share, layer_summary
 from studio.search.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord
 
@@ -181,6 +182,12 @@ def test_every_kind_of_job_is_asked_for_where_it_says() -> None:
             path = re.sub(r"\{\w+\}", "{}", kind.at)
             known = [re.sub(r"\{\w+\}", "{}", one) for one in DOCUMENT["paths"]]
             assert path in known, kind.event
+
+
+def test_pages_hear_of_every_kind_of_job_that_is_in_the_background() -> None:
+    modules = [module for name, module in sys.modules.items() if name.startswith("studio.")]
+    every = {id(one): one for module in modules for one in vars(module).values() if isinstance(one, JobKind)}
+    assert {one.event for one in every.values()} == {kind.event for kind in JOBS}
 
 
 def test_changes_of_the_workspace_and_moves_of_the_scene_are_reported(studio: Studio) -> None:

@@ -104,7 +104,7 @@ def test_killed_in_mid_run_it_is_lost_and_resumes_bit_for_bit(control: StudioCon
     assert control.state.state == "lost"
     assert 3 <= killed.summary().done < LONG
     assert killed.summary().status == "interrupted"
-    with pytest.raises(RunError, match=r"^The tracking process has died\. "):
+    with pytest.raises(RunError, match=r"^The tracking process died before it answered\. "):
         control.send(commands.Pause())
     control.restart()
     control.request(commands.SetPace())
@@ -187,6 +187,29 @@ def test_a_command_that_can_no_longer_be_sent_says_what_it_was_about(
         ProcessDiedError, match=f"^The tracking process died before it answered about {about}"
     ):
         control.request(command)
+
+
+def test_a_command_that_is_sent_as_the_process_dies_revives_it(
+    control: StudioControl, session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = new_run(session_on_disk, "a", last=2)
+    control.start()
+    first, real = control.process_identifier, OwnedProcess.send
+    dying = [True]
+
+    def send(process: OwnedProcess, command: commands.Command) -> None:
+        if dying and process.identifier == first:
+            dying.clear()
+            psutil.Process(first).kill()
+            raise ProcessDiedError("It has died.", "Resume.")
+        real(process, command)
+
+    monkeypatch.setattr(OwnedProcess, "send", send)
+    watching = control.subscribe()
+    control.send(commands.Start(session=str(session_on_disk.path), run=str(run.folder)))
+    wait_for(watching, in_state("finished"))
+    assert control.process_identifier != first
+    assert run.summary().status == "finished"
 
 
 @pytest.mark.slow
