@@ -142,7 +142,7 @@ def test_errors_of_a_known_size_give_their_half_widths(measured: InspectedRun) -
     assert known.alike == 1
     for one in known.points:
         assert one.bias_mm == pytest.approx((30.0, 0.0, 0.0), abs=0.3)
-        assert one.half_widths_mm[0] == pytest.approx(WIDER * 30.0, abs=0.3)
+        assert one.half_widths_mm[0] == pytest.approx(WIDER[0] * 30.0, abs=0.3)
         # Half, 80 and 95 % of the lengths of vectors of three normal numbers are below these.
         assert np.divide(one.scatter_mm, WIDER) == pytest.approx((1.54, 2.15, 2.80), abs=0.25)
         assert one.found == pytest.approx((0.5, 0.8, 0.95), abs=0.03)

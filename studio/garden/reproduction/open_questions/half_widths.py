@@ -1,8 +1,8 @@
 """Do half widths hold? What is promised of a run's joints against what the truth of drawn clips shows.
 
 Each clip is tracked as a user would, and its half widths are measured from its twin, which sees no truth. Then the
-share of frames is counted in which a true joint is within them. The factor by which half widths are wider than twins'
-errors (`results.uncertainty.half_widths.WIDER`) was chosen on the choosing half, so only the reporting half counts.
+share of frames is counted in which a true joint is within them. The factors by which half widths are wider than twins'
+errors (`results.uncertainty.half_widths.WIDER`) were chosen on the choosing half, so only the reporting half counts.
 Levels that a clip's few frames do not allow have no half widths there.
 """
 
