@@ -129,6 +129,7 @@ def test_without_a_card_the_bench_says_so(monkeypatch):
     assert rows_of({"gpu": found}) == []
 
 
+@pytest.mark.slow
 def test_frames_of_a_simulated_card_are_measured(tmp_path):
     """A swarm's, and those of seeds side by side, which are the ones alone."""
     script = Path(__file__).parents[2] / "search" / "trackers" / "simulated_frames.py"

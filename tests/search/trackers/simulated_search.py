@@ -24,9 +24,12 @@ from studio.search.trackers.settings import AnnealedSettings, CondensationSettin
 from studio.search.trackers.tracker import ParticleSet, start_of
 
 COUNT, LAST = 12, 5
+SAMPLES = {"edge_samples": 16, "region_samples": 16}
 SEEDS = (3, 1 << 40)
 PLAN = LayerPlan(0.4, Noise(None, 0.6, 0.8, correlated=True), crossed=0.7)
 SETTINGS = AnnealedSettings(layers=3, particles=COUNT, crossover=0.5)
+FEWER = dataclasses.replace(SETTINGS, layers=2, dynamics="constant_velocity")
+"""Of runs side by side: a pose takes the simulator a third of a second."""
 OF_FRAMES = (SETTINGS, dataclasses.replace(SETTINGS, crossover_by="parameters"))
 
 
@@ -35,7 +38,7 @@ def problem_of(device):
     _, cameras, evidence, poses = scene_of("planar_arm4")
     body = load_body("planar_arm4")
     one_view = type(evidence)(evidence.frame, evidence.views[:1])
-    settings = EdgeRegionSilhouetteSettings(device=device)
+    settings = EdgeRegionSilhouetteSettings(device=device, **SAMPLES)
     problem = EdgeRegionSilhouetteLikelihood(body, cameras[:1], settings).problem(one_view)
     return problem, search_space(body, np.full(len(body.parameters), 0.1)), poses
 
@@ -140,7 +143,7 @@ def together(found):
     problem, space, poses = problem_of("gpu")
     spaces = space, dataclasses.replace(space, sigma=1.5 * space.sigma)
     trackers = {
-        "annealed": (AnnealedParticleFilter(), dataclasses.replace(SETTINGS, dynamics="constant_velocity")),
+        "annealed": (AnnealedParticleFilter(), FEWER),
         "condensation": (Condensation(), CondensationSettings(particles=COUNT, scale_frames=3)),
     }
     for name, (tracker, settings) in trackers.items():
@@ -149,7 +152,7 @@ def together(found):
             records = []
             for frame in range(2):
                 searches = [
-                    FrameSearch(tracker, last, spaces[run], seed=SEEDS[run], frame=frame, repeats=2 - frame)
+                    FrameSearch(tracker, last, spaces[run], seed=SEEDS[run], frame=frame)
                     for run, last in zip(runs, carried, strict=True)
                 ]
                 source = lambda settings=settings: (0, settings)  # noqa: E731
