@@ -105,9 +105,19 @@ def left_behind(session: Session) -> tuple[Path, ...]:
     """Unfinished files and folders in a session and beside it, in which nothing has changed for an hour: an import, a
     mask or a copy that was killed.
     """
-    partial = [*session.path.parent.glob(f"{PARTIAL_PREFIX}*"), *session.path.rglob(f"{PARTIAL_PREFIX}*")]
+    partial = [*session.path.parent.glob(f"{PARTIAL_PREFIX}*"), *_partial_below(session.path)]
     before = time.time() - UNTOUCHED_SECONDS
     return tuple(sorted(path for path in partial if not path.is_symlink() and _newest(path) < before))
+
+
+def _partial_below(folder: Path) -> list[Path]:
+    """Unfinished files and folders in a folder. What goes while it is looked through is left out."""
+    return [
+        Path(place) / name
+        for place, folders, files in os.walk(folder)
+        for name in (*folders, *files)
+        if name.startswith(PARTIAL_PREFIX)
+    ]
 
 
 def remove_left_behind(session: Session) -> None:

@@ -326,3 +326,19 @@ def test_a_result_unpacks_to_a_bounded_size() -> None:
     assert len(bomb) < 1 << 20
     with pytest.raises(SessionError, match="unpacks to more than"):
         unpack(bomb)
+
+
+def test_verify_bears_that_a_folder_goes_while_it_looks(
+    taken: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    going, real = taken.path / "runs" / ".partial-run" / "body", os.scandir
+    going.mkdir(parents=True)
+
+    def scandir(path: object = ".") -> object:
+        if Path(str(path)) == going and going.exists():
+            shutil.rmtree(going.parent)
+        return real(path)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    assert verifying.left_behind(taken) == ()
+    assert not going.exists()
