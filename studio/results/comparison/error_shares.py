@@ -68,8 +68,6 @@ def error_shares(
     own = float(problem.log_likelihood(found[None])[0])
     preferred = heaviest if weight - own > telling_nats(settings) else found
 
-    def off(pose: Array) -> float:
-        return evaluate(pose[None], np.array([frame]), body, truth, fps).mean_mm
-
-    of_found, of_preferred, of_laid = off(found), off(preferred), off(laid)
+    poses = np.stack([found, preferred, laid])
+    of_found, of_preferred, of_laid = evaluate(poses, np.full(3, frame), body, truth, fps).per_frame_mm
     return {SEARCH: of_found - of_preferred, LIKELIHOOD: of_preferred - of_laid, BODY: of_laid}

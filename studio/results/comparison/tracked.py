@@ -204,7 +204,8 @@ def track_seeds(
     ]
     likelihood = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)
     seconds, evaluations, named = 0.0, 0, [list[list[str]]() for _ in runs]
-    truth, split = read_trc(session.truth_path), set(middles(frames, trial.split_frames))
+    split = set(middles(frames, trial.split_frames))
+    truth = read_trc(session.truth_path) if split else None
     shares = [list[Mapping[str, float]]() for _ in runs]
     for number, frame in enumerate(frames):
         seen = evidence(frame)
@@ -215,10 +216,11 @@ def track_seeds(
         evaluations = results[0].evaluations
         for lost, result in zip(named, results, strict=True):
             lost.append(list(result.limbs_lost))
-        for own, result in zip(shares, results if frame in split else (), strict=False):
-            found = result.estimate.pose if result.estimate.searched is None else result.estimate.searched
-            parts = error_shares(body, truth, fps, settings, problem, frame, found)
-            own += [] if parts is None else [parts]
+        for own, result in zip(shares, results, strict=True):
+            if truth is not None and frame in split:
+                found = result.estimate.pose if result.estimate.searched is None else result.estimate.searched
+                parts = error_shares(body, truth, fps, settings, problem, frame, found)
+                own += [] if parts is None else [parts]
         report("tracking", number + 1, len(frames))
     tracked: list[Tracked] = []
     for run, lost, own, parts in zip(runs, named, evidences, shares, strict=True):
