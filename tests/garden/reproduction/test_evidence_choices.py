@@ -1,9 +1,8 @@
 """Conclusions on the third paper's choices of evidence from made-up outcomes, and what they are measured with."""
 
-import json
-
 import numpy as np
 import pytest
+from made_up_outcomes import concluded
 
 from studio.body.catalogue import load_body
 from studio.evidence.volume.blob_model import cone_blobs
@@ -11,17 +10,8 @@ from studio.evidence.volume.relative_entropy import DivergenceOfPoses
 from studio.garden.reproduction.caillette import hulls_and_blobs as choices
 from studio.garden.reproduction.caillette import loss_test
 from studio.garden.reproduction.caillette.following import FITTED, PLACED
-from studio.garden.reproduction.catalogue import EXPERIMENTS
 from studio.results.comparison.findings import Findings
-from studio.results.comparison.trials import Outcome, Scale
-
-SCALE = Scale(seeds=(0, 1, 2, 3, 4))
-
-
-def concluded(name: str, made, scale: Scale = SCALE) -> Findings:
-    experiment = EXPERIMENTS[name]
-    outcomes = [Outcome(trial, json.loads(json.dumps(made(trial)))) for trial in experiment.trials(scale)]
-    return experiment.conclude(outcomes)
+from studio.results.comparison.trials import Scale
 
 
 def verdict(findings: Findings, start: str) -> str:

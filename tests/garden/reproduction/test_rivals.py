@@ -1,33 +1,23 @@
 """What the papers set their trackers against: conclusions from made-up outcomes, and the searches themselves."""
 
-import json
 from dataclasses import asdict
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from made_up_outcomes import concluded
 
 from studio.body.catalogue import load_body
 from studio.garden.reproduction import swarms
-from studio.garden.reproduction.catalogue import EXPERIMENTS
 from studio.garden.reproduction.deutscher_reid import rivals
 from studio.garden.reproduction.deutscher_reid.arms import silhouette, template_arm, true_pose
 from studio.garden.reproduction.deutscher_reid.particles_needed import Fewest
-from studio.results.comparison.findings import Findings
 from studio.results.comparison.tracked import Tracked
-from studio.results.comparison.trials import Outcome, Scale, Trial
+from studio.results.comparison.trials import Scale, Trial
 from studio.runs.hierarchy import hierarchy_of
 from studio.search.trackers.partitions import stages_of
 from studio.search.trackers.swarm_settings import SwarmSettings
 from studio.search.trackers.tracker import FilterState, ParticleSet, SearchSpace
-
-FIVE = Scale(seeds=(0, 1, 2, 3, 4))
-
-
-def concluded(name: str, made, scale: Scale = FIVE) -> Findings:
-    experiment = EXPERIMENTS[name]
-    outcomes = [Outcome(trial, json.loads(json.dumps(made(trial)))) for trial in experiment.trials(scale)]
-    return experiment.conclude(outcomes)
 
 
 def tracked(error: float, seed: int) -> dict:
