@@ -120,6 +120,14 @@ def copy_database(source: Path, target: Path) -> None:
         writing.close()
 
 
+def changed_while_copied(name: str, file: str) -> SessionError:
+    """The refusal of a copy of `name` whose `file` went or changed while it was made."""
+    return SessionError(
+        f"'{name}' was changed by other work while it was copied ('{file}').",
+        "Do this again: it then begins from what there is now.",
+    )
+
+
 def new_folder_beside(path: Path, parents: bool = True) -> Path:
     """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError.
 

@@ -25,12 +25,14 @@ from tempfile import TemporaryDirectory
 
 import platformdirs
 
-from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.errors import NotFoundError, SessionError, StudioError
 from studio.foundations.foreign_files import LARGEST_RECORD, check_inside, read_file, read_text
 from studio.foundations.progress import Progress, no_progress
 from studio.sessions.atomic_files import (
     PARTIAL_PREFIX,
+    changed_while_copied,
     copy_database,
+    copy_file,
     discard,
     made_whole,
     write_bytes,
@@ -199,8 +201,8 @@ def comparison_put_back(session: Session, folder: Path) -> Generator[None]:
 def upload(session: Session, address: str, progress: Progress = no_progress) -> str:
     """Put a session with its runs at an address, from which any machine works on it; returns the address.
 
-    Raises SessionError where there is a session already, where footage lies outside the session's folder, or where the
-    store refuses. An interrupted upload is begun again.
+    Raises SessionError where there is a session already, where footage lies outside the session's folder, where other
+    work changes the session meanwhile, or where the store refuses. An interrupted upload is begun again.
     """
     store = Store(address)
     checked_name(PurePosixPath(store.address).name)
@@ -460,9 +462,25 @@ def _put_part(session: Session, folder: Path, record: str) -> None:
 
 
 def _put_whole(store: Store, folder: Path, record: str, progress: Progress) -> None:
-    """Put a folder, its record last and taken away first; each run and comparison within likewise."""
+    """Put a folder, its record last and taken away first; each run and comparison within likewise.
+
+    What says which files belong to it is read first, so that what other work adds meanwhile is not half in it.
+
+    Raises SessionError where a file goes meanwhile: what was put is no session then.
+    """
     files = dict(_own_files(folder))
+    try:
+        _put_files(store, files, record, progress)
+    except (StudioError, OSError):
+        gone = next((name for name, path in files.items() if not path.exists()), "")
+        if gone and folder.exists():
+            raise changed_while_copied(folder.name, gone) from None
+        raise
+
+
+def _put_files(store: Store, files: Mapping[str, Path], record: str, progress: Progress) -> None:
     last = sorted((name for name in files if _is_record(name, record)), key=lambda name: -name.count("/"))
+    records = [(name, read_file(files[name], LARGEST_RECORD)) for name in last]
     store.remove(reversed(last))
     first = {name: path for name, path in files.items() if name not in last}
     total, came = sum(path.stat().st_size for path in files.values()), 0
@@ -474,13 +492,19 @@ def _put_whole(store: Store, folder: Path, record: str, progress: Progress) -> N
 
     progress(f"putting to {store.address}", 0, total)
     with TemporaryDirectory(prefix="studio-put-") as copies:
-        for number, name in enumerate(name for name in first if PurePosixPath(name).name == RESULTS_NAME):
-            # A store that is open has its newest pages in another file.
-            first[name] = Path(copies) / str(number)
-            copy_database(files[name], first[name])
+        for number, name in enumerate(first):
+            copy = Path(copies) / str(number)
+            if PurePosixPath(name).name == RESULTS_NAME:
+                # A store that is open has its newest pages in another file.
+                copy_database(files[name], copy)
+            elif name == CHECKSUMS:
+                copy_file(files[name], copy)
+            else:
+                continue
+            first[name] = copy
         store.put(first, on_bytes)
-    for name in last:
-        store.write(name, read_file(files[name], LARGEST_RECORD))
+    for name, content in records:
+        store.write(name, content)
 
 
 def _is_record(name: str, record: str) -> bool:

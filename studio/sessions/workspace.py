@@ -172,6 +172,8 @@ class Workspace:
             try:
                 shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
             except shutil.Error as error:
+                if not (gone := Path(error.args[0][0][0])).exists():
+                    raise atomic_files.changed_while_copied(name, gone.name) from None
                 raise SessionError(
                     f"Session '{name}' cannot be copied: {error.args[0][0][2]}.",
                     "Run 'studio inspect' on it, and remove whatever is not a file.",

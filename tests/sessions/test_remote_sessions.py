@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 import s3fs
@@ -159,6 +160,31 @@ def test_what_an_upload_broke_off_is_no_session(
     assert not (tmp_path / "x" / "toy").exists()
     upload(toy, address)
     assert remote_session(address).manifest.frame_count == toy.manifest.frame_count
+
+
+def test_a_session_that_other_work_changes_while_it_is_put_says_so_and_is_none_there(
+    address: str, toy: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alignment = toy.path / "calibration" / "cameras.alignment.json"
+    alignment.parent.mkdir(exist_ok=True)
+    alignment.write_text("{}")
+    put = Store.put
+
+    def goes_first(store: Store, *given: Any) -> None:  # noqa: ANN401 - as `Store.put` takes it
+        alignment.unlink()
+        (toy.path / "calibration" / "later.json").write_text("{}")
+        put(store, *given)
+
+    monkeypatch.setattr(Store, "put", goes_first)
+    with pytest.raises(
+        SessionError, match=r"'toy' was changed by other work .*cameras\.alignment\.json"
+    ) as no:
+        upload(toy, address)
+    assert no.value.hint.startswith("Do this again")
+    assert not Store(address).has("session.json")
+    monkeypatch.setattr(Store, "put", put)
+    assert upload(toy, address) == address
+    assert Store(address).has("calibration/later.json")
 
 
 @pytest.mark.slow

@@ -76,6 +76,24 @@ def test_a_duplicate_has_everything_and_shares_nothing(session_on_disk: Session)
         assert results.frames() == [0]
 
 
+def test_a_duplicate_of_what_other_work_changes_meanwhile_says_so(
+    session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alignment = session_on_disk.path / "calibration" / "zz.alignment.json"
+    alignment.write_text("{}")
+
+    def goes_once_listed(folder: str, _names: list[str]) -> set[str]:
+        if Path(folder) == alignment.parent:
+            alignment.unlink()
+        return set()
+
+    monkeypatch.setattr(workspace_module, "_transient", goes_once_listed)
+    with pytest.raises(SessionError, match=r"'toy' was changed by other work .*zz\.alignment\.json") as no:
+        Workspace().duplicate("toy")
+    assert no.value.hint.startswith("Do this again")
+    assert [session.name for session in Workspace().sessions()] == ["toy"]
+
+
 def test_thrown_away_and_brought_back(session_on_disk: Session) -> None:
     workspace = Workspace()
     place = workspace.trash("toy")
