@@ -29,6 +29,12 @@ def test_a_race_is_begun_and_drawn(window: StudioPage, studio: StudioServer, art
     page.get_by_text("After 10 evaluations").wait_for()
     page.get_by_role("button", name="random-search").first.click()
     assert page.locator(".race-pose").count() == 1
+    page.get_by_label("Seen", exact=True).select_option("space")
+    canvas = page.locator("canvas.race-space")
+    assert canvas.get_attribute("aria-label") == "Poses of cma-es after 10 evaluations"
+    before = canvas.screenshot()
+    canvas.press("ArrowRight")
+    assert canvas.screenshot() != before
     assert page.locator(".findings-experiment").count() == 1
     window.page.screenshot(path=artefacts / "arena.png", full_page=True)
     page.reload()

@@ -23,7 +23,7 @@ function redrawAll() {
 export class BodyDrawing {
   /**
    * shapes: {side, radius_start, radius_end} of every limb. points: all ends that are ever shown,
-   * for the scale. lines: [from, to, colour] that stand behind.
+   * for the scale. lines: [from, to, colour, width in pixels: 1] that stand behind.
    */
   constructor(canvas, shapes, points, lines = []) {
     this.canvas = canvas;
@@ -106,8 +106,8 @@ export class BodyDrawing {
       const [x, y, depth] = seen(point, this.reach.middle);
       return [width / 2 + scale * x, height / 2 - scale * y, depth];
     };
-    for (const [from, to, colour] of this.lines)
-      drawLine(pen, place(from), place(to), token(colour));
+    for (const [from, to, colour, width] of this.lines)
+      drawLine(pen, place(from), place(to), token(colour), width);
     const limbs = this.limbs.map((ends, index) => ({
       ...this.shapes[index],
       ends: ends.map(place),
@@ -171,9 +171,9 @@ function drawLimb(pen, { side, ends: [near, far], radius_start, radius_end }, sc
   pen.stroke();
 }
 
-function drawLine(pen, from, to, colour) {
+function drawLine(pen, from, to, colour, width = 1) {
   pen.strokeStyle = colour;
-  pen.lineWidth = 1;
+  pen.lineWidth = width;
   pen.beginPath();
   pen.moveTo(from[0], from[1]);
   pen.lineTo(to[0], to[1]);

@@ -1,10 +1,14 @@
-// A race drawn: the silhouette of a problem in one camera, and every racer's heaviest pose after so many evaluations.
-// Used by the race's own page (studio/results/arena/race_files.py) and by the studio's.
+// A race drawn: the silhouette of a problem in one camera, or its body in space, and every racer's heaviest pose after
+// so many evaluations. Used by the race's own page (studio/results/arena/race_files.py) and by the studio's.
 
+import { BodyDrawing } from "./body_drawing.js";
 import { seriesToken } from "./chart_looks.js";
 import { element, field, fill, hint, select, shape } from "./elements.js";
 
-/** @typedef {{ lines: number[][], left: number | null }} Drawn */
+/** @typedef {{ lines: number[][], limbs: number[][][], left: number | null }} Drawn */
+
+const WIDE = 2.5; // pixels of a racer's lines
+const FAINT = 0.35; // how solid the heaviest known pose stands among the racers' lines
 
 /** Fill a place with the pictures of a race (`drawn` of race.json), one problem at a time. */
 export function drawRace(place, problems) {
@@ -12,8 +16,10 @@ export function drawRace(place, problems) {
   place.classList.add("race");
   if (!drawable.length) return fill(place, hint("No racer's pose was kept."));
   const names = [...new Set(drawable.flatMap((problem) => Object.keys(problem.racers)))];
-  const colours = new Map(names.map((name, at) => [name, `var(--${seriesToken(at)})`]));
+  const tokens = new Map(names.map((name, at) => [name, seriesToken(at)]));
   const hidden = new Set();
+  const space = spaceDrawing();
+  let isInSpace = false;
   let problem = drawable[0];
   let at = problem.counts.length - 1;
 
@@ -25,6 +31,7 @@ export function drawRace(place, problems) {
   function draw() {
     at = Math.min(at, problem.counts.length - 1);
     const count = problem.counts[at];
+    const inSpace = isInSpace && Boolean(problem.best_limbs);
     const slider = element("input", {
       type: "range",
       min: "0",
@@ -57,22 +64,76 @@ export function drawRace(place, problems) {
             },
           ),
         ),
+        // A race that was kept before 28 November 2026 has no limbs.
+        problem.best_limbs &&
+          field(
+            "Seen",
+            select(
+              [
+                ["picture", `by camera ${problem.camera}`],
+                ["space", "in space, from any side"],
+              ],
+              isInSpace ? "space" : "picture",
+              {
+                ariaLabel: "Seen",
+                onchange: ({ target }) => {
+                  isInSpace = target.value === "space";
+                  draw();
+                },
+              },
+            ),
+          ),
         field(`After ${count} evaluations`, slider),
       ),
       element(
         "div",
         { className: "race-picture" },
-        picture(problem, count, colours, hidden),
-        standing(problem, count, colours, hidden, turn),
+        inSpace
+          ? space.drawn(problem, count, shown(problem, hidden), tokens)
+          : picture(problem, count, tokens, hidden),
+        standing(problem, count, tokens, hidden, turn),
       ),
       hint(
-        `${problem.about}, camera ${problem.camera}: the silhouette, the start pose (dashed), the heaviest known pose (wide), and each racer's heaviest with seed 0.`,
+        inSpace
+          ? `${problem.about}: the heaviest known pose (the body) and each racer's heaviest with seed 0. Drag to turn, or use the arrow keys.`
+          : `${problem.about}, camera ${problem.camera}: the silhouette, the start pose (dashed), the heaviest known pose (wide), and each racer's heaviest with seed 0.`,
       ),
     );
   }
 
   draw();
 }
+
+const shown = (problem, hidden) =>
+  Object.entries(problem.racers).filter(([name]) => !hidden.has(name));
+
+/** The race in space: one canvas, which keeps its view while counts and racers change. */
+function spaceDrawing() {
+  let drawing = null;
+  let of = null;
+  return {
+    drawn(problem, count, racers, tokens) {
+      if (of !== problem) {
+        drawing?.close();
+        const canvas = element("canvas", { className: "race-space" });
+        canvas.setAttribute("role", "img");
+        drawing = new BodyDrawing(canvas, problem.shapes, problem.best_limbs);
+        drawing.over([], FAINT);
+        of = problem;
+      }
+      const { canvas } = drawing;
+      canvas.ariaLabel = label(racers, count);
+      drawing.lines = racers.flatMap(([name, known]) =>
+        (known[count]?.limbs ?? []).map(([from, to]) => [from, to, tokens.get(name), WIDE]),
+      );
+      drawing.show(problem.best_limbs);
+      return canvas;
+    },
+  };
+}
+
+const label = (racers, count) =>
+  `Poses of ${racers.map(([name]) => name).join(", ")} after ${count} evaluations`;
 
 const lines = (segments, attributes) =>
   shape("path", {
@@ -83,14 +144,14 @@ const lines = (segments, attributes) =>
     ...attributes,
   });
 
-function picture(problem, count, colours, hidden) {
-  const racers = Object.entries(problem.racers).filter(([name]) => !hidden.has(name));
+function picture(problem, count, tokens, hidden) {
+  const racers = shown(problem, hidden);
   return shape(
     "svg",
     {
       viewBox: box(problem),
       role: "img",
-      "aria-label": `Poses of ${racers.map(([name]) => name).join(", ")} after ${count} evaluations`,
+      "aria-label": label(racers, count),
     },
     shape("path", {
       class: "race-silhouette",
@@ -101,7 +162,10 @@ function picture(problem, count, colours, hidden) {
     ...racers
       .filter(([, drawn]) => drawn[count])
       .map(([name, drawn]) =>
-        lines(drawn[count].lines, { class: "race-pose", style: `stroke: ${colours.get(name)}` }),
+        lines(drawn[count].lines, {
+          class: "race-pose",
+          style: `stroke: var(--${tokens.get(name)})`,
+        }),
       ),
   );
 }
@@ -122,7 +186,7 @@ function box(problem) {
 }
 
 /** The racers in the order of the race, each with the share of the way that is left. */
-function standing(problem, count, colours, hidden, turn) {
+function standing(problem, count, tokens, hidden, turn) {
   const known = Object.entries(problem.racers).map(([name, drawn]) => ({
     name,
     left: drawn[count]?.left ?? null,
@@ -133,7 +197,7 @@ function standing(problem, count, colours, hidden, turn) {
     { className: "race-standing" },
     ...known.map(({ name, left }) => {
       const mark = element("i", {});
-      mark.style.setProperty("--swatch", colours.get(name));
+      mark.style.setProperty("--swatch", `var(--${tokens.get(name)})`);
       return element(
         "li",
         {},

@@ -1,5 +1,5 @@
 """A race as a picture of each problem: the silhouette in one camera, and every racer's heaviest pose after so many
-evaluations, as lines along the limbs.
+evaluations, as lines along the limbs, in that picture and in space.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,9 +22,10 @@ def drawn_race(definitions: Sequence[Definition], outcomes: Sequence[Outcome]) -
     """A picture a problem, as plain values in pixels.
 
     camera, width, height : of the view with the largest silhouette. outline : closed lines [[x, y], …]. start, best :
-    lines along the limbs [[x, y, x, y], …] of the start pose and of the heaviest known one. counts : evaluations.
-    racers : by name, for each of the counts that it spent, `lines` and `left`, the share of the way from the start pose
-    to the heaviest known one that is left.
+    lines along the limbs [[x, y, x, y], …] of the start pose and of the heaviest known one. shapes : `side` and radii
+    (mm) of each limb. best_limbs : the heaviest known pose in the world, [[[x, y, z], [x, y, z]], …] (mm). counts :
+    evaluations. racers : by name, for each of the counts that it spent, its heaviest pose as `lines` and `limbs`, and
+    `left`, the share of the way from the start pose to the heaviest known one that is left.
     """
     return [_drawn(one, outcomes) for one in definitions]
 
@@ -41,6 +42,7 @@ def _drawn(definition: Definition, outcomes: Sequence[Outcome]) -> dict[str, Any
             racers[arguments["name"]] = {
                 count: {
                     "lines": _lines(problem, view, np.array(pose)),
+                    "limbs": _limbs(problem, np.array(pose)),
                     "left": _left(measured, int(count)),
                 }
                 for count, pose in measured["poses"].items()
@@ -57,6 +59,11 @@ def _drawn(definition: Definition, outcomes: Sequence[Outcome]) -> dict[str, Any
         "outline": _outline(maps.views[view].mask),
         "start": _lines(problem, view, problem.prior.start),
         "best": _lines(problem, view, best.pose),
+        "shapes": [
+            {"side": limb.side, "radius_start": limb.radius_start, "radius_end": limb.radius_end}
+            for limb in problem.body.drawn
+        ],
+        "best_limbs": _limbs(problem, best.pose),
         "counts": counts,
         "racers": racers,
     }
@@ -69,9 +76,16 @@ def _left(measured: Mapping[str, Any], count: int) -> float | None:
 
 
 def _lines(problem: Problem, view: int, pose: Array) -> list[list[float]]:
-    ends = limb_ends(problem.body, problem.whole(pose[None]))[0]
-    pixels = project(problem.cameras[view], ends)[0].reshape(-1, 4)
+    pixels = project(problem.cameras[view], _ends(problem, pose))[0].reshape(-1, 4)
     return np.round(pixels[np.isfinite(pixels).all(axis=1)], 1).tolist()
+
+
+def _limbs(problem: Problem, pose: Array) -> list[list[list[float]]]:
+    return np.round(_ends(problem, pose), 1).tolist()
+
+
+def _ends(problem: Problem, pose: Array) -> Array:
+    return limb_ends(problem.body, problem.whole(pose[None]))[0]
 
 
 def _outline(mask: Bytes) -> list[list[list[int]]]:

@@ -75,13 +75,11 @@ read it.</p></div></main>"""
 SCRIPT = """import * as echarts from "vendor/echarts.esm.min.js";
 import { drawFindings } from "js/findings.js";
 import { drawRace } from "js/race_drawing.js";
-const root = document.documentElement;
+import { startTheme } from "js/theme.js";
+startTheme();
 const { findings, drawn } = JSON.parse(document.getElementById("data").textContent);
 drawRace(document.getElementById("race"), drawn);
-drawFindings(document.getElementById("findings"), [findings], echarts);
-document.getElementById("theme").onclick = () => {
-  root.dataset.theme = root.dataset.theme === "dark" ? "light" : "dark";
-};"""
+drawFindings(document.getElementById("findings"), [findings], echarts);"""
 
 
 def race_html(document: RaceDocument) -> str:
@@ -91,7 +89,7 @@ def race_html(document: RaceDocument) -> str:
         title="Optimisers on frames",
         kind="report",
         styles=("report.css",),
-        entries=("vendor/echarts.esm.min.js", "js/findings.js", "js/race_drawing.js"),
+        entries=("vendor/echarts.esm.min.js", "js/findings.js", "js/race_drawing.js", "js/theme.js"),
         body=BODY.format(
             software=html.escape(f"Capture studio {findings['software']}"),
             date=html.escape(findings["date"][:16].replace("T", " ") + " UTC"),

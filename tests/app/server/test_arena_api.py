@@ -1,5 +1,6 @@
 """The arena through the API: what there is, a race in the background, its page; no file is ever named from afar."""
 
+import numpy as np
 import pytest
 import waiting
 from web_doubles import Studio
@@ -27,6 +28,15 @@ def test_a_race_is_begun_kept_and_downloaded(studio: Studio) -> None:
     assert (job["state"], job["measured"], job["kept"]) == ("done", 4, 0), job
     race = studio.get("/api/arena")["race"]
     assert [one["name"] for one in race["drawn"]] == ["planar-arm"]
+    [drawn] = race["drawn"]
+    last = {name: of_it[str(drawn["counts"][-1])]["limbs"] for name, of_it in drawn["racers"].items()}
+    assert list(last) == ["random-search", "cma-es"]
+    assert np.shape(drawn["best_limbs"]) == (len(drawn["shapes"]), 2, 3)
+    # Of a plane arm the better racer's tip is within a few mm of the best one's.
+    tips = {
+        name: np.linalg.norm(np.subtract(limbs, drawn["best_limbs"])[-1, 1]) for name, limbs in last.items()
+    }
+    assert min(tips.values()) < 10.0
     assert race["findings"]["seeds"] == 2
     page = studio.client.get("/api/arena/race.html")
     assert page.status_code == 200
