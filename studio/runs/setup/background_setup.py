@@ -686,7 +686,10 @@ def _check_source(session: Session, source: str, strokes: Sequence[Stroke]) -> N
     given_masks = given_masks_of(session)
     if source == "masks" and not all(given_masks.values()):
         bare = next(name for name, path in given_masks.items() if not path)
-        raise FootageError(f"No masks came with the footage of camera {bare}.", "Choose another source.")
+        raise FootageError(
+            f"No masks came with the footage of camera {bare} in session '{session.name}'.",
+            "Choose another source.",
+        )
     if source == "strokes":
         check_all_cameras(session, strokes)
     if source == "best" and not session.is_comparable:
