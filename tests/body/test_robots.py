@@ -258,6 +258,12 @@ def test_shapes_have_the_sizes_of_the_geometry(tmp_path: Path) -> None:
     assert volume(limbs["arm"]) == pytest.approx(40.0 * 400.0 * 60.0, rel=1e-4)
 
 
+def test_a_free_body_rests_where_its_file_has_it(tmp_path: Path) -> None:
+    body = load_body(str(written(tmp_path, "walker.xml", WALKER)))
+    rest = {one.name: value for one, value in zip(body.parameters, body.neutral, strict=True)}
+    assert [rest[f"root_{axis}"] for axis in "xyz"] == pytest.approx([100.0, 200.0, 900.0])
+
+
 def test_a_quaternion_is_the_rotation_that_it_means() -> None:
     for w, x, y, z in np.random.default_rng(0).normal(size=(5, 4)):
         np.testing.assert_allclose(_rotation([w, x, y, z]), Rotation.from_quat([x, y, z, w]).as_matrix())

@@ -6,7 +6,7 @@ import pytest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.model import extremities
-from studio.body.shape_space import OFFSET_SIGMA, levelled, shape_space, untaped_lengths
+from studio.body.shape_space import OFFSET_SIGMA, ShapeGroup, levelled, shape_space, untaped_lengths
 from studio.foundations.errors import BodyError
 
 
@@ -86,3 +86,8 @@ def test_absent_limbs_stay_absent() -> None:
 def test_nothing_to_fit_is_refused() -> None:
     with pytest.raises(BodyError, match="no dimensions"):
         shape_space(load_body("human31"), lengths=False, radii=False)
+
+
+def test_a_standard_deviation_of_an_offset_is_as_large_a_step_as_one_of_a_radius() -> None:
+    group = ShapeGroup("chest_out", "offset", ("chest_out",), spread=12.0)
+    assert group.resized(30.0, 0.15) == pytest.approx(42.0)

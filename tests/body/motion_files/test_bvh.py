@@ -81,6 +81,13 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str
     assert caught.value.hint
 
 
+@pytest.mark.parametrize(("last", "line"), [("MOTION\n", 17), ("Frames: 2\n", 18)])
+def test_a_file_that_breaks_off_before_its_frames_says_where(tmp_path: Path, last: str, line: int) -> None:
+    end = TEXT.index(last) + len(last)
+    with pytest.raises(StudioError, match=f"line {line}"):
+        read_bvh(written(tmp_path, TEXT[:end]))
+
+
 def test_a_file_lists_its_moving_joints_and_keeps_its_own_axes(tmp_path: Path) -> None:
     text = TEXT.replace(
         "CHANNELS 3 Yrotation Zrotation Xrotation", "CHANNELS 3 Xposition Yposition Zposition"

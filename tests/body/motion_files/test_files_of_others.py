@@ -146,6 +146,24 @@ def test_tables_of_other_programs(tmp_path: Path) -> None:
     assert read_truth(tsv, 60.0, 1).positions[0, 0].tolist() == [1.5, -2.5, 1700.0]
 
 
+def test_nexus_ends_where_another_kind_of_data_begins(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    table = f"Frame,Sub Frame{XYZ.upper()}\n,{',mm' * 6}\n0,0,1,2,3,4,5,6\n"
+    path.write_text(f"Trajectories\n100\n,,S:Head,,,S:LAnkle,,\n{table}\nDevices\n1000\n0,0,7,7,7,8,8,8\n")
+    assert read_truth(path, 60.0, 1).positions.tolist() == [[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]]
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_motives_names_may_stand_in_either_of_the_first_columns(tmp_path: Path, place: int) -> None:
+    path = tmp_path / "a.csv"
+    types, names = (("," + word, word + ",")[1 - place] for word in ("Type", "Name"))
+    path.write_text(
+        f"Format Version,1.23,Length Units,Millimeters\n\n{types}{',Marker' * 3}\n{names}{',S:Head' * 3}\n"
+        f",{',Position' * 3}\nFrame,Time (Seconds),X,Y,Z\n0,0.0,1,2,3\n"
+    )
+    assert read_truth(path, 60.0, 1).names == ("Head",)
+
+
 @pytest.mark.parametrize(("word", "mm"), [("Meters", 1000.0), ("Centimeters", 10.0), ("Millimeters", 1.0)])
 def test_motives_header_names_the_unit(tmp_path: Path, word: str, mm: float) -> None:
     path = tmp_path / "a.csv"
@@ -167,6 +185,7 @@ def test_motives_header_names_the_unit(tmp_path: Path, word: str, mm: float) -> 
         ),
         ("Format Version,1.23\nFrame,Time\n", "Motive"),
         ("Trajectories\n100\n", "Nexus"),
+        (f"Trajectories\n100\n,,S:Head,,\nFrame,Sub Frame{XYZ.upper()}\n", "Nexus"),
     ],
 )
 def test_what_such_tables_cannot_mean_is_said(tmp_path: Path, text: str, words: str) -> None:

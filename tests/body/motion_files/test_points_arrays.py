@@ -107,6 +107,8 @@ def test_freemocap(tmp_path: Path) -> None:
     values = np.random.default_rng(0).uniform(1.0, 900.0, (FRAMES, 553, 3))
     np.save(tmp_path / "a.npy", values)
     same(tmp_path / "a.npy", MEDIAPIPE, values[:, :33])
+    np.save(tmp_path / "c.npy", values[:, :33])
+    same(tmp_path / "c.npy", MEDIAPIPE, values[:, :33])
     np.save(tmp_path / "b.npy", values[:, :21])
     with pytest.raises(TruthError, match="21 points"):
         read_truth(tmp_path / "b.npy", FPS)

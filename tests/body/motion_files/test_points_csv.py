@@ -28,6 +28,15 @@ def test_columns_may_stand_in_any_order(tmp_path: Path) -> None:
     np.testing.assert_array_equal(other.positions, motion.positions)
 
 
+def test_empty_lines_between_rows_are_none(tmp_path: Path) -> None:
+    head, *rows = LONG.splitlines()
+    motion, other = (
+        read_points(written(tmp_path, text), 30.0)
+        for text in (LONG, "\n\n".join([head, *rows]) + "\n,,,,,\n")
+    )
+    np.testing.assert_array_equal(other.positions, motion.positions)
+
+
 def test_a_row_a_point_with_a_frame_left_out_and_a_point_missing(tmp_path: Path) -> None:
     motion = read_points(written(tmp_path, LONG), 30.0)
     assert motion.names == ("Nose", "Tail")
