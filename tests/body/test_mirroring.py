@@ -68,6 +68,11 @@ def test_turned_round_it_faces_the_other_way_and_covers_the_same_from_the_front(
         assert abs(there[entry][2] - here[twin(entry)][2]) < 15.0, entry
 
 
+def test_a_bodys_left_is_a_direction() -> None:
+    assert np.linalg.norm(Mirror(load_body("human31")).across) == pytest.approx(1.0)
+    np.testing.assert_allclose(Mirror(load_body("human29")).across, [0.0, 1.0, 0.0], atol=1e-6)
+
+
 def test_arms_without_a_root_are_exchanged() -> None:
     body = load_body("branched_arms6")
     pose = np.array([0.3, -0.2, 0.1, 0.0, 0.4, 0.2])

@@ -51,7 +51,7 @@ RAILS = CRANE.replace(
 
 def test_steps_limbs_and_markers_are_looked_up() -> None:
     body = parse_body(CRANE, "crane", "crane.toml")
-    assert body.joints[1].parent == 0
+    assert [joint.parent for joint in body.joints] == [-1, 0, 1]
     assert body.joints[1].steps == (
         Step(MOVE, 2, -1, 300.0),
         Step(TURN, 0, -1, pytest.approx(1.5707963267948966)),
@@ -167,6 +167,29 @@ def test_a_fault_is_named_with_file_entry_and_remedy(old: str, new: str, words: 
     for word in words:
         assert word in caught.value.message
     assert caught.value.hint.endswith((".", "}."))
+
+
+@pytest.mark.parametrize(
+    "word",
+    ["max_step = 30 }", 'type = "fixed", ', '{ turn = "x", by = 90 }', "radius_end = 20, ", "at = [0,"],
+)
+def test_a_word_that_no_table_has_is_named(word: str) -> None:
+    assert word in CRANE
+    start = "{ " if word.startswith("{ ") else ""
+    with pytest.raises(BodyError, match="colour"):
+        parse_body(
+            CRANE.replace(word, f'{start}colour = "red", {word.removeprefix(start)}', 1),
+            "crane",
+            "crane.toml",
+        )
+
+
+def test_a_mesh_that_cannot_be_read_is_refused() -> None:
+    text = CRANE.replace(
+        "markers =", 'meshes = [{ joint = "arm", points = "eJw=", triangles = "eJw=" }]\nmarkers ='
+    )
+    with pytest.raises(BodyError, match="mesh 1 cannot be read"):
+        parse_body(text, "crane", "crane.toml")
 
 
 def test_parameters_of_one_limb_must_be_neighbours() -> None:
