@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from studio.body.motion_files.reading import read_recording
 from studio.body.motion_files.recorded_motion import RecordedMotion
 from studio.body.person import SIDES, PersonMotion, joint_points
-from studio.body.retargeting import above_floor, lowest_of_sole, on_skeleton
+from studio.body.retargeting import above_floor, lowest_of_sole, on_skeleton, smooth_above
 from studio.foundations.errors import StudioError
 from studio.results.drawing_footage.person import skeleton_of_height
 
@@ -59,6 +59,17 @@ def test_feet_are_raised_out_of_the_floor_smoothly_and_only_then() -> None:
     assert np.all(np.abs(lift[:60]) < 0.1)
     assert np.all(lift < 40.0 + 1e-9)
     assert np.abs(np.diff(lift, 2)).max() < 3.0
+
+
+def test_a_curve_above_heights_rises_as_it_falls_and_holds_the_highest() -> None:
+    heights = np.zeros(41)
+    heights[20] = 5.0
+    curve = smooth_above(heights, 6)
+    np.testing.assert_allclose(curve, curve[::-1], atol=1e-12)
+    assert curve[20] == pytest.approx(5.0)
+    assert (curve >= heights).all()
+    # Held as far as the smoothing reaches, which is as far again.
+    assert np.flatnonzero(curve > 1e-12).tolist() == list(range(8, 33))
 
 
 def test_a_skeleton_with_other_names_is_refused() -> None:

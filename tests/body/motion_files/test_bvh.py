@@ -88,6 +88,21 @@ def test_a_file_that_breaks_off_before_its_frames_says_where(tmp_path: Path, las
         read_bvh(written(tmp_path, TEXT[:end]))
 
 
+@pytest.mark.parametrize(
+    ("announced", "followed", "is_cut"), [(3, 2, False), (4, 2, True), (300, 297, False), (300, 296, True)]
+)
+def test_a_file_may_announce_a_frame_or_a_hundredth_more(
+    tmp_path: Path, announced: int, followed: int, is_cut: bool
+) -> None:
+    head, rows = TEXT[: TEXT.index("1 2 3 30")], "1 2 3 30 20 10 50 60 70\n"
+    path = written(tmp_path, head.replace("Frames: 2", f"Frames: {announced}") + followed * rows)
+    if is_cut:
+        with pytest.raises(StudioError, match=f"{announced} frames are announced, {followed} follow"):
+            read_bvh_file(path)
+    else:
+        assert f"{followed} follow" in read_bvh_file(path).notes[0]
+
+
 def test_a_file_lists_its_moving_joints_and_keeps_its_own_axes(tmp_path: Path) -> None:
     text = TEXT.replace(
         "CHANNELS 3 Yrotation Zrotation Xrotation", "CHANNELS 3 Xposition Yposition Zposition"
