@@ -184,6 +184,14 @@ def test_a_word_that_no_table_has_is_named(word: str) -> None:
         )
 
 
+def test_a_joint_has_each_of_its_parameters_once() -> None:
+    text = CRANE.replace(
+        '{ turn = "z", by = "swing" }', '{ turn = "z", by = "swing" }, { turn = "z", by = "swing" }'
+    )
+    with pytest.raises(BodyError, match="each once"):
+        parse_body(text, "crane", "crane.toml")
+
+
 def test_a_mesh_that_cannot_be_read_is_refused() -> None:
     text = CRANE.replace(
         "markers =", 'meshes = [{ joint = "arm", points = "eJw=", triangles = "eJw=" }]\nmarkers ='

@@ -258,6 +258,18 @@ def test_shapes_have_the_sizes_of_the_geometry(tmp_path: Path) -> None:
     assert volume(limbs["arm"]) == pytest.approx(40.0 * 400.0 * 60.0, rel=1e-4)
 
 
+def test_what_is_only_shown_goes_before_what_only_collides(tmp_path: Path) -> None:
+    """A geometry collides by either of two numbers; that of both zero is what the robot looks like."""
+    shown = '<geom type="box" size="0.02 0.2 0.03" euler="0 0 45" contype="0" conaffinity="0"/>'
+    text = WALKER.replace(
+        '<geom type="box" size="0.02 0.2 0.03" euler="0 0 45"/>',
+        f'<geom type="sphere" size="0.3" contype="0" conaffinity="1"/>{shown}'
+        '<geom type="sphere" size="0.3" contype="1" conaffinity="0"/>',
+    )
+    body = load_body(str(written(tmp_path, "walker.xml", text)))
+    assert [limb.length for limb in body.limbs if limb.name.startswith("arm")] == pytest.approx([400.0])
+
+
 def test_a_free_body_rests_where_its_file_has_it(tmp_path: Path) -> None:
     body = load_body(str(written(tmp_path, "walker.xml", WALKER)))
     rest = {one.name: value for one, value in zip(body.parameters, body.neutral, strict=True)}

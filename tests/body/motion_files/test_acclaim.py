@@ -94,6 +94,15 @@ def test_a_small_leg_stands_where_scipy_puts_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.positions[1] - motion.positions[1, 0], motion.rest, atol=1e-9)
 
 
+def test_a_bones_axis_may_be_given_in_another_order_and_without_one(tmp_path: Path) -> None:
+    motion = read_acclaim(files(tmp_path, SKELETON.replace("axis 0 0 20 XYZ", "axis 0 30 20 ZYX")))
+    other = read_acclaim(files(tmp_path, SKELETON.replace("axis 0 0 20 XYZ", "axis 0 30 20")))
+    plain = read_acclaim(files(tmp_path, SKELETON.replace("axis 0 0 20 XYZ", "axis 0 30 20 XYZ")))
+    end = motion.index("shin_end")
+    np.testing.assert_array_equal(other.positions, plain.positions)
+    assert np.abs(motion.positions[0, end] - plain.positions[0, end]).max() > 1.0
+
+
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
@@ -103,6 +112,10 @@ def test_a_small_leg_stands_where_scipy_puts_it(tmp_path: Path) -> None:
         ("asf", "thigh shin", "thigh shine", "no bone 'shine'"),
         ("asf", "    thigh shin\n", "", "'shin' is in only one"),
         ("asf", "order TX TY TZ RX RY RZ", "order RX RY RZ TX TY TZ", "order"),
+        ("asf", "position 0 0 0", "position 0 1 0", "the root's position is not 0 0 0"),
+        ("asf", "orientation 0 0 0", "orientation 0 0 9", "the root's orientation is not 0 0 0"),
+        ("asf", "   axis XYZ\n   position", "   axis ZYX\n   position", "the root's axis is zyx"),
+        ("asf", "axis 0 0 20 XYZ", "axis 0 0 20 XXZ", "'XXZ' is no order of axes"),
         ("asf", "length 0.5", "length 0", "line 4"),
         ("asf", "length 0.5", "length", "line 4"),
         ("amc", "shin 40", "shin 40 1", "'07_01.amc', line 7: bone 'shin' has 2 numbers, not 1"),

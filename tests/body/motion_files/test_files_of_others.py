@@ -153,6 +153,20 @@ def test_nexus_ends_where_another_kind_of_data_begins(tmp_path: Path) -> None:
     assert read_truth(path, 60.0, 1).positions.tolist() == [[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]]
 
 
+def test_of_motives_columns_those_of_markers_count(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "Format Version,1.23,Length Units,Millimeters\n\n"
+        f",Type{',Bone' * 3}{',Marker' * 3}\n,Name{',S:Hip' * 3}{',S:Head' * 3}\n,{',Position' * 6}\n"
+        f"Frame,Time (Seconds){XYZ.upper()}\n0,0.0,1,2,3,4,5,6\n"
+    )
+    found = read_truth(path, 60.0, 1)
+    assert found.names == ("Head",)
+    assert found.positions.tolist() == [[[4.0, 5.0, 6.0]]]
+    path.write_text(path.read_text().replace("Marker", "Bone"))
+    assert read_truth(path, 60.0, 1).names == ("Hip", "Head")
+
+
 @pytest.mark.parametrize("place", [0, 1])
 def test_motives_names_may_stand_in_either_of_the_first_columns(tmp_path: Path, place: int) -> None:
     path = tmp_path / "a.csv"

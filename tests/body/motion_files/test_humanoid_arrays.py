@@ -67,6 +67,8 @@ def test_frames_held_twice_count_once(tmp_path: Path) -> None:
         ({"rotation_local_xyzw": np.ones((FRAMES, 2, 4))}, "shape (9, 2, 4), not (9, 3, 4)"),
         ({"root_translation_m": np.ones((4, 3))}, "entry 'root_translation_m' has shape (4, 3)"),
         ({"root_translation_m": np.full((FRAMES, 3), np.nan)}, "no number"),
+        ({"root_translation_m": np.where(np.eye(FRAMES, 3), np.nan, 0.0)}, "no number"),
+        ({"local_translation_m": np.where(np.eye(3), np.inf, 0.0)}, "no number"),
         ({"parent_indices": np.array([-1, 2, 0])}, "earlier joints"),
         ({"parent_indices": np.array([-1, -1, 0])}, "earlier joints"),
         ({"fps": np.int32(0)}, "entry 'fps'"),

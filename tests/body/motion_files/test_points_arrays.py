@@ -67,6 +67,11 @@ def test_sleap(tmp_path: Path) -> None:
         file["tracks"] = PLACES.transpose(2, 1, 0)[None]
         file["node_names"] = np.array(NAMES, dtype=object)
     same(tmp_path / "a.h5")
+    with h5py.File(tmp_path / "twice.h5", "w") as file:
+        file["tracks"] = PLACES.transpose(2, 1, 0)[None]
+        file["node_names"] = np.array(["nose", "nose"], dtype=object)
+    with pytest.raises(TruthError, match="names a point twice"):
+        read_truth(tmp_path / "twice.h5", FPS)
     with h5py.File(tmp_path / "pixels.h5", "w") as file:
         file["tracks"] = PLACES[..., :2].transpose(2, 1, 0)[None]
         file["node_names"] = np.array(NAMES, dtype=object)

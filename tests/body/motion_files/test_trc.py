@@ -64,6 +64,13 @@ def test_a_marker_with_three_blank_cells_is_missing(tmp_path: Path) -> None:
     assert np.isfinite(motion.positions[1, 0]).all()
 
 
+def test_empty_cells_at_a_rows_end_are_none(tmp_path: Path) -> None:
+    motion = read_trc(written(tmp_path, ROWS.replace("\t6\n", "\t6\t\t\n")))
+    np.testing.assert_array_equal(motion.positions, read_trc(written(tmp_path)).positions)
+    with pytest.raises(TruthError, match="line 7 has 10 columns"):
+        read_trc(written(tmp_path, ROWS.replace("\t6\n", "\t6\t\t7\n")))
+
+
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
