@@ -14,6 +14,7 @@ from studio.operations.cameras import unalign as unalign
 from studio.operations.comparing import compare as compare
 from studio.operations.comparing import sweep as sweep
 from studio.operations.course import course as course
+from studio.operations.filmed_bodies import body_from_film as body_from_film
 from studio.operations.footage import add_footage as add_footage
 from studio.operations.footage import import_footage as import_footage
 from studio.operations.footage import new_session as new_session

@@ -1,4 +1,6 @@
-"""What there is and how it stands: `gallery`, `bodies`, `edit-body`, `inspect`, `runs`, `workflow`."""
+"""What there is and how it stands: `gallery`, `inspect`, `runs`, `workflow`; bodies: `bodies`, `edit-body`,
+`body-from-film`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -8,15 +10,18 @@ import click
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import EXIT_CODE, FOUND_FAULTS, command
 from studio.foundations.words import counted
+from studio.operations.filmed_bodies import body_from_film
 from studio.operations.foreign import inspect
 from studio.operations.gallery import Gallery, gallery
 from studio.operations.opening import bodies, workflow
 from studio.operations.own_bodies import EditedBody, edit_body
 from studio.operations.remote import runs_there
+from studio.runs.setup.body_from_film import FilmedBody
 from studio.runs.setup.workflow import Workflow
 from studio.sessions.foreign_sessions import Inspection
 from studio.sessions.remote_sessions import RemoteSession
 
+REPORTED = ("sizes", "limbs", "landmarks", "disagreeing")
 MARKS = {"done": "✓", "ready": "·", "blocked": " ", "stale": "!", "running": "…"}
 
 
@@ -100,6 +105,50 @@ def edit_body_command(call: Call) -> dict[str, object]:
         "text": f"Saved as '{edited.body.name}' ({edited.file})."
         if edited.file
         else edited.text.rstrip("\n"),
+    }
+
+
+@command_of(body_from_film)
+def body_from_film_command(call: Call) -> dict[str, object]:
+    made: FilmedBody = call()
+    lines = [
+        f"{one.name:28} {one.before:8.1f} → {one.after:7.1f} mm "
+        + (f"± {one.deviation:.1f}" if one.told else "  as in the template beside the rest")
+        for one in made.sizes
+    ]
+    lines += [""] if made.limbs else []
+    lines += [
+        f"{one.limb:28} {one.length:8.1f} mm, in {counted(one.count, 'frame')} {one.mean:.1f} ± {one.scatter:.1f}"
+        for one in made.limbs
+    ]
+    lines += [
+        "",
+        f"Clicks are {made.off:.1f} pixels off (median; 90 %: {made.off_most:.1f}) where sizes were fitted.",
+    ]
+    if made.checked:
+        lines.append(
+            f"In {counted(len(made.checked), 'frame')} not used they are {made.checked_off:.1f} off"
+            f" (90 %: {made.checked_off_most:.1f})."
+        )
+    lines.append(
+        f"Saved as '{made.saved}' ({made.file}): look at it on the page Bodies."
+        if made.saved
+        else "Nothing was saved: give it a name with --as."
+    )
+    entries = {key: [asdict(one) for one in getattr(made, key)] for key in REPORTED}
+    return {
+        "session": call.given["session"].name,
+        "body": made.saved,
+        "file": str(made.file or ""),
+        "frames": list(made.frames),
+        "checked": list(made.checked),
+        "off": made.off,
+        "off_most": made.off_most,
+        "checked_off": made.checked_off,
+        "checked_off_most": made.checked_off_most,
+        "notes": list(made.notes),
+        "text": "\n".join(lines),
+        **entries,
     }
 
 

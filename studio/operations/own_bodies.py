@@ -147,7 +147,7 @@ def edit_body(
     )
     made, written, file = change.body, body_text(change.body), None
     if wanted.save_as:
-        file = _save(written, wanted.save_as, place, replace=wanted.replace)
+        file = save_body(written, wanted.save_as, place, replace=wanted.replace)
         made = parse_body(written, wanted.save_as, file.name)
     say(progress, change.notes)
     return EditedBody(made, written, change.notes, file)
@@ -195,8 +195,8 @@ def body_folders(workspace: Workspace, session: Session | None = None) -> tuple[
     return (folder,) if folder.is_dir() else ()
 
 
-def _save(text: str, name: str, folder: Path, *, replace: bool) -> Path:
-    """Write a body file that was checked.
+def save_body(text: str, name: str, folder: Path, *, replace: bool) -> Path:
+    """Write a body file that was checked; returns where it lies.
 
     Raises BodyError for a shipped body's name, and for an existing one unless it is replaced; NameRefused.
     """

@@ -23,6 +23,7 @@ COUNTS = {
     "dog": (29, 17),
     "mouse": (29, 15),
     "mouse31": (31, 17),
+    "fly48": (48, 27),
     "hand25": (25, 20),
 }
 HUMANS = ("human31", "human29", "human34", "human35", "human25")
@@ -62,6 +63,7 @@ def test_trunk_and_head_are_named_where_there_are_any() -> None:
         "dog": {"loin": "trunk", "chest": "trunk", "head": "head"},
         "mouse": {"rump": "trunk", "seat": "trunk", "loin": "trunk", "chest": "trunk", "head": "head"},
         "mouse31": {"rump": "trunk", "seat": "trunk", "loin": "trunk", "chest": "trunk", "head": "head"},
+        "fly48": {"thorax": "trunk", "head": "head", "abdomen": "trunk"},
         "planar_arm4": {},
         "branched_arms6": {},
         "hand25": {},

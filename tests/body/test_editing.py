@@ -13,7 +13,7 @@ from studio.body.reader import parse_body
 from studio.body.writing import body_text
 from studio.foundations.errors import BodyError
 
-ALIKE = ("mouse", "mouse31", "dog", "human25", "human29", "human34", "human35", "branched_arms6")
+ALIKE = ("mouse", "mouse31", "dog", "fly48", "human25", "human29", "human34", "human35", "branched_arms6")
 """Bodies whose sides are alike as they are shipped; human31 has the sides of its person."""
 
 

@@ -82,6 +82,7 @@ OTHERS = {
     "reproduce": "minutes",
     "gallery": "makes a session",
     "edit-body": "bodies of the workspace",
+    "body-from-film": "bodies of the workspace",
     "download": "from a store",
     "doctor": "no session",
     "bench": "minutes",
