@@ -75,7 +75,7 @@ def body_from_film(
     if not clicks:
         raise BodyError(
             f"No landmarks were clicked in session '{opened.name}'.",
-            "Click them on the page Bodies, or give a CSV file of them.",
+            "Click them in step Subject of the guided set-up, or give a CSV file of them.",
         )
     template = load_body(like or opened.manifest.body, opened.body_folders)
     with reporting(progress, f"{opened.name}: body from film") as report:

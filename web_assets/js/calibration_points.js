@@ -1,4 +1,4 @@
-// The same points of the floor clicked in two views or more.
+// Points clicked in the pictures of several cameras; the same points of the floor in two or more.
 
 import { html, useState } from "./studio/component.js";
 import { Action, Failure, Toggle } from "./studio/parts.js";
@@ -9,6 +9,7 @@ const MOST = 32;
 /**
  * Pixels of the stored picture under a point of the upright image: shares x, y (0..1) from its top
  * left corner.
+ * @returns {[number, number]}
  */
 function storedPixel(camera, x, y) {
   const turned = [
@@ -31,6 +32,47 @@ function shownAt(camera, [u, v]) {
   ][camera.quarter_turns % 4];
 }
 
+/**
+ * Cameras' pictures to click on, with what was clicked. `picture(name)`: the address of a camera's;
+ * `marks(name)`: pixels of its stored picture and their words; `click(name, pixel)` hears of a
+ * click.
+ * @param {{ cameras: any[], picture: (camera: string) => string,
+ *   marks: (camera: string) => { pixel: [number, number] | undefined, words: any, isChosen: boolean }[],
+ *   click: (camera: string, pixel: [number, number]) => void }} properties
+ */
+export function ClickViews({ cameras, picture, marks, click }) {
+  const hear = (/** @type {any} */ camera, /** @type {MouseEvent} */ event) => {
+    const box = /** @type {HTMLElement} */ (event.currentTarget);
+    const shape = /** @type {HTMLElement} */ (box.firstElementChild).getBoundingClientRect();
+    const x = (event.clientX - shape.left) / shape.width;
+    const y = (event.clientY - shape.top) / shape.height;
+    if (x >= 0 && y >= 0 && x <= 1 && y <= 1) click(camera.name, storedPixel(camera, x, y));
+  };
+  return html`<div class="pictures click-views">
+    ${cameras.map(
+      (camera) => html`<figure key=${camera.name} class="picture">
+        <div class="clickable" onClick=${(event) => hear(camera, event)}>
+          <img src=${picture(camera.name)} alt=${`Picture of ${camera.name}`} draggable=${false} />
+          <div class="marks">
+            ${marks(camera.name).map(({ pixel, words, isChosen }) => {
+              if (!pixel) return null;
+              const [x, y] = shownAt(camera, pixel);
+              return html`<i
+                key=${words}
+                class=${isChosen ? "mark chosen" : "mark"}
+                style=${{ left: `${100 * x}%`, top: `${100 * y}%` }}
+              >
+                ${words}
+              </i>`;
+            })}
+          </div>
+        </div>
+        <figcaption><b>${camera.name}</b></figcaption>
+      </figure>`,
+    )}
+  </div>`;
+}
+
 /** In how many views a point was clicked. */
 const viewsOf = (point) => Object.keys(point.pixels).length;
 
@@ -47,13 +89,8 @@ export function FloorClicks({ cameras, picture, send, stop }) {
   const complete = points.filter((point) => viewsOf(point) > 1);
   const isReady = complete.length >= FEWEST;
 
-  const click = (/** @type {any} */ camera, /** @type {MouseEvent} */ event) => {
-    const box = /** @type {HTMLElement} */ (event.currentTarget);
-    const shape = /** @type {HTMLElement} */ (box.firstElementChild).getBoundingClientRect();
-    const x = (event.clientX - shape.left) / shape.width;
-    const y = (event.clientY - shape.top) / shape.height;
-    if (x < 0 || y < 0 || x > 1 || y > 1) return;
-    const pixels = { ...points[chosen].pixels, [camera.name]: storedPixel(camera, x, y) };
+  const click = (/** @type {string} */ camera, /** @type {[number, number]} */ pixel) => {
+    const pixels = { ...points[chosen].pixels, [camera]: pixel };
     const next = points.with(chosen, { pixels });
     const isFull = viewsOf(next[next.length - 1]) > 1 && next.length < MOST;
     setPoints(isFull ? [...next, { pixels: {} }] : next);
@@ -90,27 +127,16 @@ export function FloorClicks({ cameras, picture, send, stop }) {
       })}
     </div>
     <${Failure} error=${wrong} />
-    <div class="pictures click-views">
-      ${cameras.map(
-        (camera) => html`<figure key=${camera.name} class="picture">
-          <div class="clickable" onClick=${(event) => click(camera, event)}>
-            <img src=${picture(camera.name)} alt=${`Picture of ${camera.name}`} draggable=${false} />
-            <div class="marks">
-              ${points.map(({ pixels: { [camera.name]: pixel } }, at) => {
-                if (!pixel) return null;
-                const [x, y] = shownAt(camera, pixel);
-                return html`<i
-                  class=${at === chosen ? "mark chosen" : "mark"}
-                  style=${{ left: `${100 * x}%`, top: `${100 * y}%` }}
-                >
-                  ${at + 1}
-                </i>`;
-              })}
-            </div>
-          </div>
-          <figcaption><b>${camera.name}</b></figcaption>
-        </figure>`,
-      )}
-    </div>
+    <${ClickViews}
+      cameras=${cameras}
+      picture=${picture}
+      click=${click}
+      marks=${(camera) =>
+        points.map(({ pixels: { [camera]: pixel } }, at) => ({
+          pixel,
+          words: at + 1,
+          isChosen: at === chosen,
+        }))}
+    />
   </div>`;
 }

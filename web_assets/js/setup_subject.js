@@ -1,10 +1,11 @@
-// Step Subject: which body, how tall, what follows from it; and the fit to the footage, with
-// lengths before and after.
+// Step Subject: which body, how tall, what follows from it; the fit to the footage, with lengths
+// before and after; and a body from landmarks that are clicked.
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { percent } from "./elements.js";
 import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
+import { FilmPanel, LandmarkClicks, landmarksOf } from "./setup_landmarks.js";
 import { Stature } from "./setup_stature.js";
 import { batch, html, into, signal, useState } from "./studio/component.js";
 import { Action, Failure, Progress, Select, Table } from "./studio/parts.js";
@@ -104,6 +105,8 @@ export function modelOf(setup, [stored, choices, known]) {
     }
   }
 
+  const landmarks = landmarksOf(setup, bodies, stored.body);
+
   if (known?.state === "failed") unfitted.value = known;
   else if (known && isGoing(known)) follow(async () => known);
   // What was saved shows as the session's subject, until that is another one.
@@ -120,6 +123,7 @@ export function modelOf(setup, [stored, choices, known]) {
     fit,
     unfitted,
     options,
+    landmarks,
     isChanged,
     isSized,
     /** @param {string} name */
@@ -176,6 +180,7 @@ export function modelOf(setup, [stored, choices, known]) {
     stop: () => {
       isLeft = true;
       clearTimeout(timer);
+      landmarks.stop();
     },
   };
 }
@@ -408,6 +413,7 @@ function FitPictures(/** @type {{ model: Model, fit: Fit }} */ { model, fit }) {
 
 /** The body as it stands, or as it is fitted. @param {{ model: Model }} properties */
 export function Beside({ model }) {
+  if (model.landmarks.isClicking.value) return html`<${LandmarkClicks} model=${model.landmarks} />`;
   const [fit, subject] = [model.fit.value, model.subject.value];
   if (fit && isGoing(fit) && fit.frames.length)
     return html`
@@ -443,4 +449,5 @@ export function Beside({ model }) {
 export const Panel = ({ model }) => html`
   <${Who} model=${model} />
   <${Fitting} model=${model} />
+  <${FilmPanel} model=${model.landmarks} />
 `;
