@@ -4,8 +4,21 @@ import cv2
 import numpy as np
 import pytest
 from drawn_people import ring_of_cameras
+from toy_footage import looking_at
 
-from studio.evidence.floor_shadows import Cells, FloorShadows, cells_of, with_cells
+from studio.evidence.floor_shadows import (
+    Cells,
+    FloorShadows,
+    _drop_lesser_parts,
+    _grown,
+    _maps,
+    _middle_seen,
+    cells_of,
+    lowest_changed,
+    on_floor,
+    seen_at,
+    with_cells,
+)
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 
@@ -127,3 +140,252 @@ def test_a_shadow_that_only_one_camera_films_stays_one() -> None:
     alone = [Cells(np.zeros((240, 320), np.uint8), 2) for _ in CAMERAS]
     alone[0].kinds[200:210, 5:15] = 2
     assert not any(one.any() for one in FloorShadows(CAMERAS).unexplained(alone))
+
+
+@pytest.mark.parametrize("size", [(700, 31), (33, 640), (960, 48), (320, 24), (321, 20)])
+def test_a_cells_kind_is_that_of_its_pixels(size: tuple[int, int]) -> None:
+    """Changed from 0.375 of its area on, like a shadow from half of what changed in it on; both in bytes."""
+    rng = np.random.default_rng(size)
+    side = -(-max(size) // 320)
+    rows, columns = -(-size[1] // side), -(-size[0] // side)
+    share = np.kron(rng.random((rows, columns)) ** 2, np.ones((side, side)))[: size[1], : size[0]]
+    passing = np.kron(rng.random((rows, columns)), np.ones((side, side)))[: size[1], : size[0]]
+    drawn_pixels = rng.random(share.shape)
+    shadow = np.where(
+        (drawn_pixels < share) & (rng.random(share.shape) < passing), np.uint8(255), np.uint8(0)
+    )
+    mask = np.where(drawn_pixels < share, np.uint8(255), np.uint8(0)) & ~shadow
+    mask[:5], mask[:, :5], mask[-1], mask[0] = 0, 0, 255, 0
+    shadow[:, :7] = 0
+    for given in (shadow, None):
+        wanted = np.zeros((rows, columns), np.uint8)
+        for row, column in np.ndindex(rows, columns):
+            place = np.s_[row * side : (row + 1) * side, column * side : (column + 1) * side]
+            changed = mask[place] if given is None else mask[place] | shadow[place]
+            everything = np.rint(255 * np.count_nonzero(changed) / side**2)
+            passing_bytes = (
+                np.rint(255 * np.count_nonzero(shadow[place]) / side**2) if given is not None else 0
+            )
+            if everything / 255 >= 0.375:
+                wanted[row, column] = 2 if passing_bytes >= 0.5 * everything else 1
+        cells = cells_of(mask, given)
+        assert cells.size == side
+        np.testing.assert_array_equal(cells.kinds, wanted)
+        assert given is None or len(np.unique(wanted)) == 3
+    nothing = cells_of(np.zeros_like(mask), np.zeros_like(mask))
+    assert nothing.kinds.shape == (rows, columns)
+    assert not nothing.kinds.any()
+
+
+def small(number: int, bent: float = 1.0) -> Camera:
+    """One of a ring, of a few pixels, turned about its axis and moved aside, of a lens that folds within sight."""
+    camera = ring_of_cameras(4, 24, 20)[number]
+    lens = bent * np.array([-0.3 - 0.1 * number, 0.02, 0.004, -0.003, 0.001])
+    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    skewed = camera.matrix + np.array(
+        [[0.0, 0.2 * (number if bent == 1.0 else 0), 0.0], [0, 0, 0], [0, 0, 0]]
+    )
+    changes = {
+        "matrix": skewed,
+        "distortion": lens,
+        "rotation": turn @ camera.rotation,
+        "translation": turn @ camera.translation + (150.0, -90.0, 0.0),
+    }
+    return Camera(**{**fields(camera), **changes})
+
+
+SMALL = tuple(small(number) for number in range(4))
+SIDES = (4, 2, 3, 1)
+
+
+def views_of(cameras: tuple[Camera, ...]) -> np.ndarray:
+    return FloorShadows(cameras)._views
+
+
+def random_cells(seed: int, share: float = 0.5) -> list[Cells]:
+    rng = np.random.default_rng(seed)
+    return [
+        Cells(
+            (rng.random((-(-20 // side), -(-24 // side))) < share).astype(np.uint8) * rng.integers(1, 3), side
+        )
+        for side in SIDES
+    ]
+
+
+def plainly_seen(cells: list[Cells], owner: int, place: np.ndarray, most: int) -> tuple[int, int]:
+    changed = unchanged = 0
+    for number, (camera, one) in enumerate(zip(SMALL, cells, strict=True)):
+        x, y, depth = camera.rotation @ place + camera.translation
+        square = (x * x + y * y) / depth**2
+        k1, k2, _, _, k3 = camera.distortion
+        if number == owner or depth <= 0.0 or 1.0 + k1 * square + k2 * square**2 + k3 * square**3 <= 0.0:
+            continue
+        pixel = np.nan_to_num(project(camera, place)[0], nan=-99.0).clip(-99.0, 99.0)
+        column, row = np.floor((pixel + 0.5) / one.size).astype(int)
+        if 0 <= column < one.kinds.shape[1] and 0 <= row < one.kinds.shape[0]:
+            if one.kinds[row, column]:
+                changed += 1
+            else:
+                unchanged += 1
+                if unchanged == most:
+                    break
+    return changed, unchanged
+
+
+def test_how_many_see_a_place_is_what_its_projections_say() -> None:
+    rng = np.random.default_rng(4)
+    cells = random_cells(0)
+    kinds, maps = np.concatenate([one.kinds.ravel() for one in cells]), _maps(cells)
+    places = np.concatenate(
+        [
+            rng.uniform([-3000, -3000, -500], [3000, 3000, 3000], (600, 3)),
+            rng.uniform(-9000, 9000, (600, 3)),
+            *(camera.centre + np.array((0.03, 0.05, 0.5)) @ camera.rotation for camera in SMALL),
+        ],
+        axis=None,
+    ).reshape(-1, 3)
+    views, answers = views_of(SMALL), set()
+    for place in places:
+        for owner, most in ((0, 1), (1, 2), (3, 4)):
+            expected = plainly_seen(cells, owner, place, most)
+            assert seen_at(kinds, maps, views, owner, *place, most) == expected
+            answers.add(expected)
+    assert len(answers) > 8
+
+
+def random_rays(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cameras' numbers and directions of unit length, some of them upwards."""
+    rng = np.random.default_rng(count)
+    owners = rng.integers(0, 4, count)
+    aims = rng.uniform([-900, -900, 0], [900, 900, 1800], (count, 3))
+    rays = aims - np.array([SMALL[owner].centre for owner in owners])
+    rays[::7, 2] *= -1.0
+    return owners, rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("height", [0.0, 300.0])
+def test_the_floor_explains_a_cell_where_another_camera_sees_it_changed(height: float) -> None:
+    owners, rays = random_rays(300)
+    for share in (0.2, 1.0):
+        cells = random_cells(1, share)
+        kinds = np.concatenate([one.kinds.ravel() for one in cells])
+        explained = on_floor(kinds, _maps(cells), views_of(SMALL), owners, rays, height)
+        expected = []
+        for owner, ray in zip(owners, rays, strict=True):
+            centre = SMALL[owner].centre
+            place = centre + (height - centre[2]) / ray[2] * ray
+            expected.append(ray[2] < 0.0 and plainly_seen(cells, int(owner), place, 9)[0] > 0)
+        np.testing.assert_array_equal(explained, expected)
+        assert 20 < np.count_nonzero(expected) < 280
+
+
+@pytest.mark.parametrize("least", [1, 2])
+def test_the_lowest_place_on_a_ray_is_the_first_from_its_far_end(least: int) -> None:
+    owners, rays = random_rays(150)
+    cells = random_cells(2, 0.85)
+    kinds = np.concatenate([one.kinds.ravel() for one in cells])
+    explained = np.random.default_rng(2).random(len(rays)) < 0.1
+    box = np.array([[-2500.0, -900.0, 100.0], [800.0, 2600.0, 1900.0]])
+    places = lowest_changed(kinds, _maps(cells), views_of(SMALL), owners, rays, explained, box, 70.0, least)
+    expected = np.full_like(places, np.inf)
+    for k, (owner, ray) in enumerate(zip(owners, rays, strict=True)):
+        centre = SMALL[owner].centre
+        ends = np.sort((box - centre) / ray, axis=0)
+        first, along = max(0.0, ends[0].max()), ends[1].min()
+        while not explained[k] and along > first:
+            changed, unchanged = plainly_seen(cells, int(owner), centre + along * ray, 9)
+            if changed >= least and not unchanged:
+                expected[k] = centre + along * ray
+                break
+            along -= 70.0
+    np.testing.assert_allclose(places, expected, atol=1e-9)
+    assert 30 < np.isfinite(places[:, 0]).sum() < 130
+
+
+def test_cells_rays_pass_through_their_middles() -> None:
+    mild = (small(1, 0.1), small(2, 0.1))
+    tells, cells = (
+        FloorShadows(mild),
+        [Cells(np.zeros((10, 12), np.uint8), 2), Cells(np.zeros((7, 8), np.uint8), 3)],
+    )
+    owners, rays = tells._rays_through(cells, [np.array([5, 13, 117]), np.array([0, 9, 33, 55])])
+    assert owners.tolist() == [0, 0, 0, 1, 1, 1, 1]
+    middles = [(10.5, 0.5), (2.5, 2.5), (18.5, 18.5), (1.0, 1.0), (4.0, 4.0), (4.0, 13.0), (22.0, 19.0)]
+    for owner, ray, middle in zip(owners, rays, middles, strict=True):
+        camera = mild[owner]
+        assert np.linalg.norm(ray) == pytest.approx(1.0)
+        np.testing.assert_allclose(project(camera, camera.centre + 2000.0 * ray)[0], middle, atol=0.02)
+    assert _maps(cells).tolist() == [[0, 10, 12, 2], [120, 7, 8, 3]]
+
+
+def test_pieces_of_which_too_little_is_chosen_are_dropped() -> None:
+    kinds = np.zeros((20, 60), np.uint8)
+    kinds[2:7, 2:12], kinds[2:7, 20:30], kinds[12:17, 2:12] = 2, 2, 2
+    kinds[7, 12] = 2  # touches the first by a corner: 51 cells
+    kinds[10, 40:50] = 1
+    chosen = np.zeros_like(kinds)
+    chosen[3, 3:6] = chosen[3, 21:24] = chosen[13, 3:5] = 1
+    _drop_lesser_parts(chosen, kinds)
+    wanted = np.zeros_like(kinds)
+    wanted[3, 21:24] = 1
+    np.testing.assert_array_equal(chosen, wanted)
+    speck = np.zeros((7, 7), np.uint8)
+    speck[3, 3] = 2
+    assert _grown(speck).tolist() == [
+        [2 if 2 <= x <= 4 and 2 <= y <= 4 else 0 for x in range(7)] for y in range(7)
+    ]
+
+
+def test_the_middle_is_where_the_axes_meet() -> None:
+    target, places = (
+        np.array([200.0, -300.0, 900.0]),
+        np.array([[3.0, 0, 1], [0, 4.0, 1], [-1.0, 0, 2.0]]) * 1000.0,
+    )
+    axes = (target - places) / np.linalg.norm(target - places, axis=1, keepdims=True)
+    middle, distance = _middle_seen(places, axes)
+    np.testing.assert_allclose(middle, target, atol=1e-6)
+    assert distance == pytest.approx(np.median(np.linalg.norm(target - places, axis=1)))
+    for degrees, seen in ((5.6, False), (5.9, True)):
+        turn = np.deg2rad(degrees)
+        two = np.array([[np.cos(turn), np.sin(turn), 0.0], [np.cos(turn), -np.sin(turn), 0.0]])
+        middle, distance = _middle_seen(-1000.0 * two, two)
+        assert np.isfinite(distance) == seen
+        np.testing.assert_allclose(middle, np.zeros(3), atol=1e-6)
+
+
+@pytest.mark.parametrize(("height", "usable"), [(0.075, False), (0.085, True)])
+def test_cameras_have_to_stand_well_above_the_floor(height: float, usable: bool) -> None:
+    """All of them, in shares of their distance from what they look at: a camera that is lowered looks on as before."""
+    cameras = [looking_at("a", place, (0.0, 0.0, 1000.0 * height)) for place in SIDEWAYS[:2]]
+    cameras.append(looking_at("low", (0.0, -1000.0, 1000.0 * height), (0.0, 0.0, 1000.0 * height)))
+    assert FloorShadows(cameras).usable == usable
+
+
+SIDEWAYS = ((1000.0, 0.0, 200.0), (0.0, 1000.0, 200.0))
+
+
+def test_the_scene_is_around_what_changed_from_the_floor_upwards() -> None:
+    """With a share of the cameras' distance around it. What stands well above z = 0 stands on the lowest of it."""
+    for raised in (0.0, 700.0):
+        cells = [
+            cells_of(drawn(camera, TRUNK + np.array((300.0, -200.0, raised))), None) for camera in CAMERAS
+        ]
+        tells, maps = FloorShadows(CAMERAS), _maps(cells)
+        kinds = np.concatenate([one.kinds.ravel() for one in cells])
+        scene = tells._scene(kinds, cells, maps)
+        distance = np.median([np.linalg.norm(camera.centre - tells._middle) for camera in CAMERAS])
+        around = 0.05 * distance
+        chosen = [np.flatnonzero(one.kinds) for one in cells]
+        stride = 1 + sum(map(len, chosen)) // 800
+        owners, rays = tells._rays_through(cells, [own[::stride] for own in chosen])
+        box = np.array([[-1.5, -1.5, 0.0], [1.5, 1.5, 1.5]]) * distance + tells._middle * (1.0, 1.0, 0.0)
+        none = np.zeros(len(rays), np.bool_)
+        places = lowest_changed(kinds, maps, tells._views, owners, rays, none, box, 0.012 * distance, 2)
+        places = places[np.isfinite(places[:, 0])]
+        wanted = np.array([places.min(axis=0) - around, places.max(axis=0) + around])
+        wanted[0, 2] = np.quantile(places[:, 2], 0.03) if raised else 0.0
+        np.testing.assert_allclose(scene, wanted)
+        assert abs(scene[0, 2] - raised) < 60.0
+        np.testing.assert_allclose(scene[0, :2], (150.0 - around, -350.0 - around), atol=150.0)
+    nothing = [Cells(np.zeros((240, 320), np.uint8), 2) for _ in CAMERAS]
+    assert FloorShadows(CAMERAS)._scene(np.zeros(4 * 240 * 320, np.uint8), nothing, _maps(nothing)) is None

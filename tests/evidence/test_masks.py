@@ -8,7 +8,15 @@ import pytest
 from scipy import ndimage
 from toy_footage import looking_at
 
-from studio.evidence.masks import cleaned, reduced, uncleaned
+from studio.evidence.masks import (
+    PackedMask,
+    PackedMasks,
+    cleaned,
+    disc,
+    reduced,
+    reduced_cleaning,
+    uncleaned,
+)
 from studio.evidence.settings import EvidenceSettings
 
 OFF = dataclasses.replace(
@@ -100,3 +108,63 @@ def test_a_mask_that_is_not_cleaned_stays_as_it_is() -> None:
     )
     assert (cleaned(mask, strict) != mask).any()
     np.testing.assert_array_equal(cleaned(mask, uncleaned(strict)), mask)
+
+
+def test_two_pixels_open_and_close_as_three_do() -> None:
+    """Only odd kernels have a middle; one pixel changes nothing."""
+    mask = blobs(3)
+    mask[::7, ::5] ^= 255
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+    for knob, operation in (("mask_opening", cv2.MORPH_OPEN), ("mask_closing", cv2.MORPH_CLOSE)):
+        expected = cv2.morphologyEx(mask, operation, kernel)
+        assert (expected != mask).any()
+        np.testing.assert_array_equal(cleaned(mask, dataclasses.replace(OFF, **{knob: 2})), expected)
+        np.testing.assert_array_equal(cleaned(mask, dataclasses.replace(OFF, **{knob: 1})), mask)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_holes_are_no_pieces_and_none_of_a_pieces_area(turned: bool) -> None:
+    """A frame of 84 pixels around 16, which is more than the smaller piece beside it has."""
+    mask = np.zeros((30, 30), np.uint8)
+    mask[3:13, 3:13], mask[6:10, 6:10], mask[20:23, 20:24] = 255, 0, 255
+    mask = np.ascontiguousarray(mask[::-1] if turned else mask)
+    solid = mask.copy()
+    cv2.floodFill(solid, None, (7, 22 if turned else 7), 255)
+
+    def kept(**knobs: int) -> np.ndarray:
+        return cleaned(mask, dataclasses.replace(OFF, **knobs))
+
+    np.testing.assert_array_equal(kept(mask_keep_components=2), mask)
+    np.testing.assert_array_equal(kept(mask_fill_holes=17), solid)
+    np.testing.assert_array_equal(kept(mask_min_component=12), mask)
+    frame = np.where(np.arange(30) < 15, mask, 0)
+    np.testing.assert_array_equal(kept(mask_min_component=84), frame)
+    assert not kept(mask_min_component=85).any()
+
+
+def test_the_clean_up_of_smaller_pictures_is_smaller() -> None:
+    settings = dataclasses.replace(
+        OFF,
+        mask_opening=12, mask_closing=7, mask_fill_holes=90, mask_min_component=184, mask_keep_components=2,
+    )  # fmt: skip
+    expected = dataclasses.replace(
+        settings, mask_opening=4, mask_closing=2, mask_fill_holes=10, mask_min_component=20
+    )
+    assert reduced_cleaning(settings, 3.0) == expected
+    nothing = dataclasses.replace(OFF, mask_keep_components=0)
+    assert uncleaned(settings) == nothing
+
+
+def test_packed_masks_come_out_as_they_were() -> None:
+    masks, packed = {"a": blobs(1)[:, :157], "b": blobs(2)}, PackedMasks()
+    for camera, mask in masks.items():
+        packed.put(camera, mask)
+    assert list(packed) == ["a", "b"]
+    assert len(packed) == 2
+    for camera, mask in masks.items():
+        np.testing.assert_array_equal(packed[camera], mask)
+    assert PackedMask(masks["b"]).nbytes == 120 * 160 // 8
+
+
+def test_a_disc_reaches_as_far_as_it_says() -> None:
+    assert disc(2).tolist() == [[0, 0, 1, 0, 0], [1] * 5, [1] * 5, [1] * 5, [0, 0, 1, 0, 0]]

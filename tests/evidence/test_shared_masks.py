@@ -39,3 +39,15 @@ def test_a_subject_that_is_not_in_the_picture_gets_nothing() -> None:
     one, other = shared_mask(box(5, 55), [box(10, 30), np.zeros((20, 60), np.uint8)])
     assert (one == box(5, 55)).all()
     assert not other.any()
+
+
+def test_a_pixel_that_is_as_near_to_two_is_both_ones_and_reach_is_the_last_that_counts() -> None:
+    whole = np.ones((20, 60), np.uint8)
+    silhouettes = [(box(10, 20) > 0).astype(np.uint8), (box(30, 40) > 0).astype(np.uint8)]
+    one, other = shared_mask(whole, silhouettes, reach=6.0)
+    assert {int(value) for value in np.unique([one, other])} == {0, 255}
+    assert np.flatnonzero(one[10]).tolist() == [*range(4, 25)]
+    assert np.flatnonzero(other[10]).tolist() == [*range(25, 46)]
+    one, other = shared_mask(whole, [box(10, 20), box(31, 40)])
+    assert np.flatnonzero(one[10]).tolist() == [*range(26)]
+    assert np.flatnonzero(other[10]).tolist() == [*range(25, 60)]

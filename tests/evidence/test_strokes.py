@@ -1,5 +1,6 @@
 """Strokes as pixels: where they lie in a smaller picture, and what they enclose."""
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -29,3 +30,19 @@ def test_later_strokes_paint_over_earlier_ones() -> None:
     assert marks[5, 10] == 2
     assert marks[5, 4] == marks[5, 18] == 1
     assert not marks[9].any()
+
+
+def test_the_thinnest_stroke_is_a_pixel_wide() -> None:
+    assert np.argwhere(painted([stroke((4, 2), (4, 6), width=0.2)], (9, 9))).tolist() == [
+        [y, 4] for y in range(2, 7)
+    ]
+
+
+def test_a_stroke_says_all_of_itself_and_stays_as_it_is() -> None:
+    one = stroke((1, 2))
+    with pytest.raises(AttributeError):
+        one.width = 3.0
+    with pytest.raises(TypeError):
+        Stroke("a", 0, "inside", 1.0, ((1.0, 2.0),))
+    with pytest.raises(msgspec.ValidationError, match="unknown"):
+        msgspec.convert({**msgspec.to_builtins(one), "hardness": 1.0}, Stroke)

@@ -99,3 +99,21 @@ def test_independent_variances_make_diagonal_gaussians_in_bgr() -> None:
     np.testing.assert_allclose(
         np.einsum("i,hwij,j->hw", away, background.precision, away), 3.0 / 1.25, rtol=1e-4
     )
+
+
+def test_a_plate_has_a_noise_of_two_and_a_half_grey_levels_unless_it_is_said() -> None:
+    plate = np.full((1, 1, 3), 100, np.uint8)
+    seen = np.full((1, 1, 3), 110, np.uint8)
+    # Twice the noise: of the plate and of the picture.
+    expected = 3 * 10.0**2 / (2.0 * 2.5**2)
+    assert learn_background([plate]).squared_distances(seen)[0, 0] == pytest.approx(expected, rel=1e-5)
+    given = plate.astype(np.float32), np.zeros((1, 1, 3), np.float32)
+    assert independent_background(*given).squared_distances(seen)[0, 0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_packed_rows_are_the_mean_and_the_precisions_diagonal_and_upper_triangle() -> None:
+    background = learn_background(list(clip(np.random.default_rng(7), 20)))
+    rows = background.packed().reshape(9, 4, 5)
+    np.testing.assert_array_equal(rows[:3], np.moveaxis(background.mean, 2, 0))
+    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    np.testing.assert_array_equal(rows[3:], [background.precision[..., i, j] for i, j in places])
