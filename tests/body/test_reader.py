@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from studio.body.dimensions import with_dimensions
@@ -146,7 +147,55 @@ FAULTS = [
         "boom = { mm = 300, ratio = 1 }",
         ("dimension 'boom'", "exactly one of mm and ratio"),
     ),
-    ("boom = { mm = 300 }", "boom = { mm = 300, of_height = 3 }", ("dimension 'boom'", "of_height 3")),
+    ("boom = { mm = 300 }", "boom = { mm = 300, of_height = 1.2 }", ("dimension 'boom'", "of_height 1.2")),
+    ("boom = { mm = 300 }", "boom = { }", ("dimension 'boom'", "exactly one of mm and ratio")),
+    ("boom = { mm = 300 }", "boom = { mm = 300, spread = 0 }", ("dimension 'boom'", "spread 0")),
+    ("boom = { mm = 300 }", "boom = { mm = 300, spread = inf }", ("dimension 'boom'", "spread inf")),
+    ("boom = { mm = 300 }", "boom = { mm = inf, spread = 1 }", ("dimension 'boom'", "is inf")),
+    ("boom = { mm = 300 }", "boom = { mm = 300, of_height = -0.1 }", ("dimension 'boom'", "of_height -0.1")),
+    ("boom = { mm = 300 }", "boom = { mm = 300, of_height = nan }", ("dimension 'boom'", "of_height nan")),
+    (
+        "s = { ratio = 0.5 }",
+        "s = { ratio = 0.5, of_height = 0.1 }",
+        ("dimension 's'", "a ratio with of_height"),
+    ),
+    ("s = { ratio = 0.5 }", "s = { ratio = -0.5, spread = 1 }", ("dimension 's'", "is -0.5")),
+    ("s = { ratio = 0.5 }", "s = { ratio = 0 }", ("limb 'arm'", "scale_x 0")),
+    ('scale_x = "s"', 'scale_x = "thin"', ("limb 'arm'", "scale_x 'thin'")),
+    ('scale_x = "s"', "scale_y = -1", ("limb 'arm'", "scale_y -1")),
+    ('radius_start = "fat"', 'radius_start = "-fat"', ("limb 'arm'", "negative radius_start")),
+    ('radius_start = "fat"', 'radius_start = "s"', ("limb 'arm'", "'s', a ratio")),
+    ("lower = -90", "lower = 90", ("parameter 'swing'", "lower 90 not below upper 90")),
+    ("upper = 90", "upper = nan", ("parameter 'swing'", "upper nan")),
+    ("upper = 90", "neutral = nan", ("parameter 'swing'", "neutral nan")),
+    ("upper = 90", "neutral = inf", ("parameter 'swing'", "neutral inf outside")),
+    ("upper = 90", "upper = 90, neutral = 91", ("parameter 'swing'", "neutral 91 outside")),
+    ("upper = 90", 'neutral = [0, "mast"]', ("parameter 'swing'", "unknown dimension")),
+    ("upper = 90", "spread = 0", ("parameter 'swing'", "spread 0")),
+    ("upper = 90", "spread = nan", ("parameter 'swing'", "spread nan")),
+    ('limb = "arm", max_step = 30', 'limb = "arm", max_step = inf', ("parameter 'lift'", "max_step inf")),
+    (
+        'turn = "x", by = 90',
+        'turn = "x", move = "x", by = 90',
+        ("arm', step 2", "exactly one of move and turn"),
+    ),
+    ('turn = "x", by = 90', 'turn = "x", by = "boom"', ("arm', step 2", "unknown parameter 'boom'")),
+    (
+        'turn = "y", by = "-lift"',
+        'move = "y", by = "-lift"',
+        ("arm', step 3", "needs a parameter of kind 'length'"),
+    ),
+    ('at = [0, "-boom", 5]', 'at = [0, 5, "-mast"]', ("marker 'Hook'", "'-mast', an unknown dimension")),
+    ('at = [0, "-boom", 5]', "at = [0, inf, 5]", ("marker 'Hook'", "at inf")),
+    ('name = "hook", parent', "parent", ("joint 'number 3'", "missing required field 'name'")),
+    ('name = "swing"', 'name = "2swing"', ("parameter '2swing'", "is no name")),
+    ('name = "Hook"', 'name = "Ho-ok"', ("marker 'Ho-ok'", "is no name")),
+    ('name = "hook", parent', 'name = "world", parent', ("joint 'world'", "the fixed frame")),
+    (
+        "[dimensions]",
+        'meshes = [{ joint = "leg", points = "", triangles = "" }]\n[dimensions]',
+        ("mesh 1", "'leg'"),
+    ),
     ('title = "Crane"', "title = Crane", ("is not valid TOML",)),
     ('title = "Crane"', 'colour = "red"', ("unknown field 'colour'",)),
     (
@@ -167,6 +216,111 @@ def test_a_fault_is_named_with_file_entry_and_remedy(old: str, new: str, words: 
     for word in words:
         assert word in caught.value.message
     assert caught.value.hint.endswith((".", "}."))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "names"),
+    [
+        ('turn = "y", by = "-lift"', 'turn = "y", by = "-lfit"', "swing, lift"),
+        ('by = "boom" }', 'by = "mast" }', "boom, fat, s"),
+        ('parent = "base"', 'parent = "mast"', "world, base"),
+        ('joint = "arm", length', 'joint = "leg", length', "base, arm, hook"),
+        ("radius_end = 20", 'radius_end = "thin"', "boom, fat, s"),
+    ],
+)
+def test_beside_an_unknown_name_stand_those_that_may_be_meant(old: str, new: str, names: str) -> None:
+    with pytest.raises(BodyError) as caught:
+        parse_body(CRANE.replace(old, new), "crane", "crane.toml")
+    assert caught.value.hint == f"Name one of: {names}."
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("boom = { mm = 300 }", "boom = { mm = 0, of_height = 0 }"),
+        ("boom = { mm = 300 }", "boom = { mm = 300, of_height = 1 }"),
+        ("boom = { mm = 300 }", "boom = { mm = -300, spread = 10 }"),
+        ("radius_end = 20", "radius_end = 0"),
+        ("lower = -90", "lower = -90, neutral = -90"),
+        ("lower = -90", "lower = -90, neutral = 90"),
+    ],
+)
+def test_what_lies_on_the_limit_of_what_may_be_is_read(old: str, new: str) -> None:
+    parse_body(CRANE.replace(old, new), "crane", "crane.toml")
+
+
+@pytest.mark.parametrize("group", ["parameters", "joints", "limbs"])
+def test_a_body_without_one_of_its_parts_is_refused(group: str) -> None:
+    start = CRANE.index(f"{group} = [")
+    end = CRANE.index("\n]", start) + 2
+    with pytest.raises(BodyError, match="no parameters, joints or limbs"):
+        parse_body(f"{CRANE[:start]}{group} = []{CRANE[end:]}", "crane", "crane.toml")
+
+
+DRIVEN = {
+    (0, 0): "fixed",
+    (1, 0): "hinge",
+    (2, 0): "two-axis",
+    (3, 0): "ball",
+    (0, 1): "slide",
+    (3, 3): "free",
+}
+
+
+@pytest.mark.parametrize("kind", DRIVEN.values())
+def test_a_joints_type_says_how_many_angles_and_lengths_drive_it(kind: str) -> None:
+    for angles in range(5):
+        for lengths in range(5):
+            steps = [
+                *(("turn", f"a{at}") for at in range(angles)),
+                *(("move", f"l{at}") for at in range(lengths)),
+            ]
+            driven = ", ".join(f'{{ {word} = "x", by = "{name}" }}' for word, name in steps)
+            kinds = {"turn": "angle", "move": "length"}
+            more = "".join(
+                f'{{ name = "{name}", kind = "{kinds[word]}", limb = "hook", max_step = 1 }},\n'
+                for word, name in steps
+            )
+            text = CRANE.replace(
+                '"hook", parent = "arm", type = "fixed"', f'"hook", parent = "arm", type = "{kind}"'
+            )
+            text = text.replace('{ move = "z", by = -20 }', driven).replace(
+                "\n]\njoints", f"\n{more}]\njoints"
+            )
+            if DRIVEN.get((angles, lengths)) == kind:
+                assert len(parse_body(text, "crane", "crane.toml").parameters) == 2 + angles + lengths
+            else:
+                with pytest.raises(BodyError, match=f"joint 'hook' is '{kind}'"):
+                    parse_body(text, "crane", "crane.toml")
+
+
+def test_angles_become_radians_and_lengths_stay() -> None:
+    entry = 'label = "Reach", lower = -4, upper = 900, neutral = [100, "-fat"], spread = 7, max_step = 50'
+    turned = "lower = -10, upper = 20, neutral = 5, spread = 4, max_step = 30"
+    text = RAILS.replace('upper = 900, neutral = [100, "boom"], max_step = 50', entry)
+    text = text.replace(
+        'name = "lift", kind = "angle", limb = "arm", max_step = 30',
+        f'name = "lift_it", kind = "angle", limb = "arm", {turned}',
+    )
+    text = text.replace('"-lift"', '"-lift_it"').replace(
+        "scale_x", 'side = "left", part = "head", scale_y = 2, scale_x'
+    )
+    body = parse_body(text, "crane", "crane.toml")
+    reach, lift = body.parameters[0], body.parameters[-1]
+    assert (reach.label, reach.kind, reach.limb) == ("Reach", "length", "base")
+    assert (reach.lower, reach.upper, reach.neutral, reach.spread, reach.max_step) == (-4, 900, 60, 7, 50)
+    assert (lift.label, lift.kind, lift.limb) == ("lift it", "angle", "arm")
+    found = (lift.lower, lift.upper, lift.neutral, lift.spread, lift.max_step)
+    np.testing.assert_allclose(found, np.radians([-10.0, 20.0, 5.0, 4.0, 30.0]))
+    assert (body.name, body.title, body.limbs[0].name, body.limbs[0].joint) == ("crane", "Crane", "arm", 1)
+    assert (body.limbs[0].side, body.limbs[0].part, body.limbs[0].scale_y) == ("left", "head", 2.0)
+    assert (body.markers[0].name, body.markers[0].joint) == ("Hook", 2)
+    assert body.joints[0].steps[:4] == (
+        Step(MOVE, 0, 0, 1),
+        Step(MOVE, 1, 1, 1),
+        Step(MOVE, 2, 2, 1),
+        Step(TURN, 2, 5, 1),
+    )
 
 
 @pytest.mark.parametrize(

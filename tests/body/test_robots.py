@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 import studio.body.robots as robots
 import studio.results.drawing_footage
 from studio.body.catalogue import body_file_text, list_bodies, load_body
-from studio.body.forward_kinematics import limb_ends, marker_points
+from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.body.reader import parse_body
-from studio.body.robots import THIN, _rotation, fitted_cone
+from studio.body.robots import THIN, _about, _pointing, _rotation, _to_z, _turns, fitted_cone
 from studio.foundations.errors import BodyError
 
 ARM = Path(studio.results.drawing_footage.__file__).parent / "recipe_files" / "robot_arm.urdf"
@@ -78,6 +78,60 @@ WALKER = """<mujoco model="walker">
 </mujoco>"""
 
 
+CRANE = """<mujoco model="2 cranes!">
+<compiler angle="radian" autolimits="true" boundmass="1" boundinertia="1"/>
+<worldbody>
+  <geom type="plane" size="1 1 1"/>
+  <body name="bin"><geom type="box" size="1 1 1"/></body>
+  <body name="base" pos="1 2 0.5" quat="0.8 0 0 0.6">
+    <geom type="plane" size="1 1 1"/>
+    <geom name="g0" type="cylinder" size="0.1 0.2" pos="0.01 0.02 0.03" quat="0.5 0.5 -0.5 0.5"/>
+    <geom name="g1" type="sphere" size="0.07" pos="0.3 0 0"/>
+    <geom type="sphere" size="2e-5"/>
+    <geom type="cylinder" size="2e-5 0.3"/>
+    <body name="left column" pos="0 0 0.2">
+      <joint name="spin" axis="0 0 -2" range="-1 2" ref="0.5" pos="0.02 0 0"/>
+      <geom name="g2" type="capsule" size="0.05" fromto="0 0 0 0.1 0 0.6"/>
+      <site name="lamp" pos="0.1 -0.2 0.3"/>
+      <site pos="0 0 0"/>
+      <body name="mast" pos="0 0 0.6" quat="0.6 0 0.8 0">
+        <body name="boom" pos="0.1 0 0.1">
+          <joint name="lift" axis="0 -1 0.5" range="-0.5 1.5" ref="0.1"/>
+          <joint name="reach" type="slide" axis="0 0 1" range="0.1 1.5" ref="0.25"/>
+          <geom name="g3" type="ellipsoid" size="0.05 0.3 0.02" pos="0 0.3 0"/>
+          <body name="Right-claw" pos="0 0.6 0">
+            <joint name="claw" type="slide" axis="1 0 0" range="0 0.1"/>
+            <geom name="g4" type="box" size="0.03 0.02 0.1"/>
+          </body>
+          <body name="Right+claw" pos="0 0.6 0">
+            <joint name="claw 2" type="slide" axis="-1 0 0" range="0 0.1" ref="0.02"/>
+            <joint name="idle" axis="1 0 0" ref="0.3"/>
+            <geom name="g5" type="box" size="0.03 0.1 0.02"/>
+          </body>
+          <body name="Right claw" pos="0 0.6 0.1">
+            <joint name="wrist" type="ball" range="0 0.8"/>
+            <geom name="g6" type="box" size="0.1 0.02 0.03"/>
+            <body name="odd" pos="0.1 0 0">
+              <joint name="odd" axis="0 1 0"/>
+              <body pos="0.2 0 0"><joint/><joint axis="1 0 0" name="tip"/></body>
+            </body>
+          </body>
+        </body>
+      </body>
+    </body>
+  </body>
+</worldbody>
+<equality>
+  <joint joint1="claw 2" joint2="claw" polycoef="0.01 -1 0 0 0"/>
+  <joint joint1="idle" polycoef="0.2 0 0 0 0"/>
+  <joint joint1="odd" joint2="lift" polycoef="0 1 0.1 0 0"/>
+  <joint joint1="tip" joint2="lift" polycoef="0 1 0 0 0" active="false"/>
+  <weld body1="bin" body2="base" active="false"/>
+</equality>
+<keyframe><key qpos="2.5 -0.7 0.5 0.03 0.03 0.3 0.8 0 0.6 0 0.2 0.1 0.1"/></keyframe>
+</mujoco>"""
+
+
 def written(folder: Path, name: str, text: str) -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
@@ -113,9 +167,11 @@ def places(text: str, body: BodyModel, poses: np.ndarray, links: dict[str, str])
             elif name in index:
                 data.qpos[at] = pose[index[name]] * (1e-3 if kind == 2 else 1.0)
         for number in range(model.neq):
+            if not model.eq_active0[number] or model.eq_data[number][2:5].any():
+                continue
             one, two = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
             first, second = int(model.jnt_qposadr[one]), int(model.jnt_qposadr[two])
-            moved = data.qpos[second] - model.qpos0[second]
+            moved = data.qpos[second] - model.qpos0[second] if two >= 0 else 0.0
             data.qpos[first] = (
                 model.qpos0[first] + model.eq_data[number][0] + model.eq_data[number][1] * moved
             )
@@ -258,6 +314,147 @@ def test_shapes_have_the_sizes_of_the_geometry(tmp_path: Path) -> None:
     assert volume(limbs["arm"]) == pytest.approx(40.0 * 400.0 * 60.0, rel=1e-4)
 
 
+@pytest.fixture
+def crane(tmp_path: Path) -> BodyModel:
+    return load_body(str(written(tmp_path, "crane.xml", CRANE)))
+
+
+def test_everything_that_a_joint_may_do_is_as_in_mujoco(crane: BodyModel) -> None:
+    links = {
+        "base": "base", "left column": "left column", "mast": "mast", "boom": "boom", "lamp": "@lamp",
+        "Right_claw": "Right-claw", "Right_claw_2": "Right+claw", "Right claw": "Right claw", "odd": "odd",
+    }  # fmt: skip
+    poses = random_poses(crane, 20, seed=5)
+    np.testing.assert_allclose(
+        markers(crane, poses, list(links)), places(CRANE, crane, poses, links), atol=1e-5
+    )
+    assert [marker.name for marker in crane.markers] == [
+        *list(links)[:2],
+        "lamp",
+        "mast",
+        "boom",
+        *list(links)[5:],
+        "body 10",
+    ]
+
+
+def test_parameters_have_the_files_limits_its_keyframe_and_the_limb_of_their_chain(crane: BodyModel) -> None:
+    wanted = {
+        "spin": ("left column", -1.0, 2.0, 2.0),
+        "lift": ("left column", -0.5, 1.5, -0.5),
+        "reach": ("left column", 100.0, 1500.0, 500.0),
+        "claw": ("Right_claw", 0.0, 100.0, 30.0),
+        "wrist_turn_z": ("Right claw", -0.8, 0.8, 0.0),
+        "wrist_turn_y": ("Right claw", -0.8, 0.8, 0.8),
+        "wrist_turn_x": ("Right claw", -0.8, 0.8, 0.0),
+        "odd": ("Right claw", -np.inf, np.inf, 0.2),
+        "body_10_joint_9": ("Right claw", -np.inf, np.inf, 0.1),
+        "tip": ("Right claw", -np.inf, np.inf, 0.1),
+    }
+    assert [(one.name, one.limb) for one in crane.parameters] == [
+        (name, one[0]) for name, one in wanted.items()
+    ]
+    for entry in crane.parameters:
+        _, lower, upper, neutral = wanted[entry.name]
+        assert (entry.lower, entry.upper) == pytest.approx((lower, upper)), entry.name
+        assert entry.neutral == pytest.approx(neutral), entry.name
+        assert entry.max_step == pytest.approx(500.0 if entry.kind == "length" else np.pi), entry.name
+    assert [entry.name for entry in crane.parameters if entry.kind == "length"] == ["reach", "claw"]
+
+
+def test_every_part_lies_where_its_geometry_does_and_is_as_large(crane: BodyModel) -> None:
+    """Half the length and both radii about their axes as one matrix, beside the geometry's own."""
+    model = mujoco.MjModel.from_xml_string(CRANE)
+    data = mujoco.MjData(model)
+    data.qpos[[0, 1, 2, 3, 4, 5]] = 0.4, 0.3, 0.9, 0.05, 0.02 + 0.01 - 0.05, 0.3 + 0.2
+    mujoco.mj_kinematics(model, data)
+    pose = np.array([0.4, 0.3, 900.0, 50.0, *np.zeros(6)])
+    box, ball = 2.0 / np.sqrt(np.pi), np.sqrt(2.0 / 3.0)
+    sizes = {
+        "base 1": [100.0, 100.0, 200.0],
+        "base 2": [70.0, 70.0 * ball, 70.0 * ball],
+        "left column": [50.0, 50.0, 500.0 * np.hypot(0.1, 0.6) + 100.0 / 3.0],
+        "boom": [50.0 * ball, 300.0, 20.0 * ball],
+        "Right_claw": [30.0 * box, 20.0 * box, 100.0],
+        "Right_claw_2": [30.0 * box, 100.0, 20.0 * box],
+        "Right claw": [100.0, 20.0 * box, 30.0 * box],
+    }
+    drawn = [limb for limb in crane.drawn if limb.name in sizes]
+    assert [limb.name for limb in drawn] == list(sizes)
+    frames, ends = limb_frames(crane, pose)[0], limb_ends(crane, pose)[0]
+    for number, (name, size) in enumerate(sizes.items()):
+        limb, geom = drawn[number], data.geom(f"g{number}")
+        place = crane.drawn.index(limb)
+        turn, own = frames[place][:, :3], geom.xmat.reshape(3, 3)
+        radius = limb.radius_start
+        assert limb.radius_end == radius
+        ours = turn @ np.diag([radius * limb.scale_x, radius * limb.scale_y, limb.length / 2.0]) @ turn.T
+        np.testing.assert_allclose(ours, own @ np.diag(size) @ own.T, atol=1e-3, err_msg=name)
+        np.testing.assert_allclose(ends[place].mean(axis=0), 1e3 * geom.xpos, atol=1e-4, err_msg=name)
+    assert [limb.side for limb in crane.limbs if limb.name in sizes] == [
+        "middle",
+        "middle",
+        "left",
+        "middle",
+        *["right"] * 3,
+    ]
+    assert [limb.name for limb in crane.limbs if limb.name not in sizes] == ["mast", "odd"]
+    mast = next(limb for limb in crane.drawn if limb.name == "mast")
+    assert (mast.length, mast.radius_start, mast.radius_end) == pytest.approx((141.4213562, 16.971, 16.971))
+    assert sorted(crane.dimensions) == [
+        f"{name}_{end}" for name in ("mast", "odd") for end in ("radius_end", "radius_start")
+    ]
+
+
+def test_what_was_changed_of_a_file_is_said(crane: BodyModel) -> None:
+    assert crane.title == "link 2 cranes, 10 parameters"
+    assert crane.definition.source == (
+        "Made of crane.xml, metres as mm. Left out: bin; "
+        "joint 'odd' follows 'lift' in the file and moves by itself here; "
+        "a part of 'base' that no cone can be was left out; "
+        "links without geometry (mast, odd) have a radius of 0.12 of their length."
+    )
+
+
+def test_of_things_that_lie_about_the_first_is_the_body(tmp_path: Path) -> None:
+    thing = '<body name="{}"><freejoint/><geom type="sphere" size="0.1"/></body>'
+    text = f"<mujoco><worldbody>{''.join(thing.format(name) for name in 'abc')}</worldbody></mujoco>"
+    body = load_body(str(written(tmp_path, "things.xml", text)))
+    assert [marker.name for marker in body.markers] == ["a"]
+    assert "Left out: b, c." in body.definition.source
+
+
+def test_rotations_are_turns_about_z_then_y_then_x() -> None:
+    turns = [
+        *Rotation.random(20, rng=np.random.default_rng(0)),
+        *Rotation.from_euler("ZYX", [[20, 90, 0], [30, -90, 0]], degrees=True),
+    ]
+    for turn in turns:
+        again = Rotation.from_euler("ZYX", _turns(turn.as_matrix()), degrees=True)
+        np.testing.assert_allclose(again.as_matrix(), turn.as_matrix(), atol=1e-9)
+    for axis, name in enumerate("xyz"):
+        np.testing.assert_allclose(_about(axis, 0.3), Rotation.from_euler(name, 0.3).as_matrix(), atol=1e-12)
+        np.testing.assert_array_equal(_to_z(axis)[:, 2], np.eye(3)[axis])
+        assert np.linalg.det(_to_z(axis)) == pytest.approx(1.0)
+    for axis in Rotation.random(5, rng=np.random.default_rng(1)).as_matrix()[:, 0]:
+        azimuth, polar = _pointing(axis)
+        np.testing.assert_allclose(_about(2, azimuth) @ _about(1, polar) @ [0, 0, 1], axis, atol=1e-12)
+
+
+@pytest.mark.parametrize(("metres", "is_read"), [(99.9, True), (100.1, False)])
+@pytest.mark.parametrize("what", ['xyz="-0.05 0 0.2"', 'length="0.1"'])
+def test_what_is_longer_than_a_hundred_metres_is_taken_for_millimetres(
+    tmp_path: Path, what: str, metres: float, is_read: bool
+) -> None:
+    odd = f'xyz="0 0 -{metres}"' if what.startswith("xyz") else f'length="{metres}"'
+    path = written(tmp_path, "long.urdf", GRIPPER.replace(what, odd))
+    if is_read:
+        load_body(str(path))
+        return
+    with pytest.raises(BodyError, match="length of 100 m"):
+        load_body(str(path))
+
+
 def test_what_is_only_shown_goes_before_what_only_collides(tmp_path: Path) -> None:
     """A geometry collides by either of two numbers; that of both zero is what the robot looks like."""
     shown = '<geom type="box" size="0.02 0.2 0.03" euler="0 0 45" contype="0" conaffinity="0"/>'
@@ -292,6 +489,43 @@ def test_a_meshs_cone_is_that_of_a_cone() -> None:
     assert part.length == pytest.approx(300.0)
     wide = [radius * scale for radius in part.radii for scale in sorted(part.scales)]
     assert wide == pytest.approx([24.0, 40.0, 12.0, 20.0], rel=0.06)
+
+
+def corners(low: float, high: float, wide: float, flat: float, length: float) -> np.ndarray:
+    """Of a block along y, `low` times as wide and thick at its beginning and `high` times at its end."""
+    return np.array(
+        [
+            (x * wide * end, y, z * flat * end)
+            for y, end in ((7.0, low), (7.0 + length, high))
+            for x in (3.0, 4.0)
+            for z in (-2.0, -1.0)
+        ]
+    )
+
+
+def test_a_blocks_cone_has_its_area_everywhere() -> None:
+    part = fitted_cone(corners(1.0, 1.0, 20.0, 5.0, 100.0))
+    np.testing.assert_allclose(part.start, [70.0, 7.0, -7.5])
+    np.testing.assert_allclose(part.turn, np.roll(np.eye(3), -2, axis=1))
+    assert part.length == pytest.approx(100.0)
+    assert part.radii == pytest.approx([np.sqrt(100.0 / np.pi)] * 2)
+    assert part.scales == pytest.approx([0.5, 2.0])
+    assert part.guessed
+
+
+def test_a_mesh_that_grows_along_its_axis_has_a_cone_that_does() -> None:
+    part = fitted_cone(corners(1.0, 2.0, 20.0, 20.0, 300.0))
+    assert part.radii == pytest.approx(np.array([1.0, 2.0]) * 20.0 / np.sqrt(np.pi), rel=0.03)
+    pointed = fitted_cone(corners(1e-3, 1.0, 20.0, 20.0, 300.0))
+    assert pointed.radii[0] >= 0.05 * pointed.radii[1] * (1.0 - 1e-9)
+    assert pointed.radii[0] < 0.1 * pointed.radii[1]
+
+
+@pytest.mark.parametrize(
+    "points", [np.eye(3), np.c_[np.random.default_rng(0).normal(size=(9, 2)), np.zeros(9)]]
+)
+def test_what_is_flat_has_no_cone(points: np.ndarray) -> None:
+    assert fitted_cone(points) is None
 
 
 def test_a_mesh_beside_the_file_is_found(tmp_path: Path) -> None:
@@ -366,6 +600,7 @@ def test_a_urdf_may_float_in_its_root(tmp_path: Path) -> None:
 
 
 LOOP = WALKER.replace("<equality>", '<equality><connect body1="shin" body2="arm" anchor="0 0 0"/>')
+WELD = '<weld name="shut" body1="shin" body2="arm"/>'
 STILL = """<robot name="r"><link name="a"/><link name="b"/>
 <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>"""
 MILLIMETRES = GRIPPER.replace('<origin xyz="-0.05 0 0.2"/>', '<origin xyz="-50 0 200"/>')
@@ -375,6 +610,11 @@ MILLIMETRES = GRIPPER.replace('<origin xyz="-0.05 0 0.2"/>', '<origin xyz="-50 0
     ("name", "text", "words"),
     [
         ("loop.xml", LOOP, "closes a chain"),
+        (
+            "welded.xml",
+            LOOP.replace('<connect body1="shin" body2="arm" anchor="0 0 0"/>', WELD),
+            "constraint 'shut'",
+        ),
         ("still.urdf", STILL, "no joint that moves"),
         ("large.urdf", MILLIMETRES, "length of 206 m"),
         ("odd.urdf", "<robot", "cannot be read"),
