@@ -129,7 +129,7 @@ def robot_definition(path: Path) -> BodyDefinition:
     except (ElementTree.ParseError, ValueError, RuntimeError) as problem:
         words = " ".join(str(problem).split())[:300]
         raise BodyError(f"Robot file {path.name} cannot be read: {words}.", "Correct the file.") from None
-    return _Robot(compiled, path, _speeds(root), notes, is_urdf=root.tag == "robot").definition()
+    return _Robot(compiled, path, _speeds(root), notes).definition()
 
 
 def _ignore(_warning: str) -> None:
@@ -268,7 +268,6 @@ class _Robot:
     path: Path
     speeds: dict[str, float]
     notes: list[str]
-    is_urdf: bool
     names: dict[str, set[str]] = field(default_factory=dict[str, set[str]])
     parameters: list[ParameterEntry] = field(default_factory=list[ParameterEntry])
     joints: list[JointEntry] = field(default_factory=list[JointEntry])
