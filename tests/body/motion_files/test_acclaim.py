@@ -103,6 +103,105 @@ def test_a_bones_axis_may_be_given_in_another_order_and_without_one(tmp_path: Pa
     assert np.abs(motion.positions[0, end] - plain.positions[0, end]).max() > 1.0
 
 
+TREE = """:units
+  mass 1
+  length 2 # in inches
+  angle rad
+:documentation
+  length 7
+:root
+   order TX TY TZ RX RY RZ
+:bonedata
+  begin
+     name tip
+     direction 0 0 1
+     length 4
+     dof
+  end
+  begin
+     name arm
+     direction 1 0 0
+     length 2 mm
+     axis 0.1 0.2 0.3 zyx # an order in small letters
+     dof rz RX
+  end
+  begin
+     name stiff
+     direction 0 1 0
+     length 0
+     axis 0.4 0.5 0.6 XYZ
+  end
+  begin
+     name leg
+     direction 0 -1 0
+     length 3
+     dof ry
+  end
+:hierarchy
+  begin
+    arm tip leg
+    stiff arm
+    root stiff
+  end
+"""
+TREE_FRAMES = """# made
+  :FULLY-SPECIFIED
+
+1
+root 1 2 3 0.1 0.2 0.3 # the first
+arm 0.4 0.5
+
+leg 0.6
+2
+leg -0.6
+arm 0.1 0.2
+root 0 0 0 0 0 0
+"""
+
+
+def test_a_tree_of_turning_and_stiff_bones_in_radians_in_any_order(tmp_path: Path) -> None:
+    motion = read_acclaim(files(tmp_path, TREE, TREE_FRAMES))
+    assert motion.names == ("root", "stiff", "arm", "tip", "leg", "tip_end", "leg_end")
+    assert motion.parents == (-1, 0, 1, 2, 2, 3, 4)
+    assert motion.source == "07_01.amc"
+    root = Rotation.from_euler("xyz", [0.1, 0.2, 0.3])
+    axis = Rotation.from_euler("zyx", [0.1, 0.2, 0.3])
+    arm = root * axis * Rotation.from_euler("zx", [0.4, 0.5]) * axis.inv()
+    leg = arm * Rotation.from_euler("y", 0.6)
+    elbow = np.array([1.0, 2.0, 3.0]) + arm.apply([2.0, 0.0, 0.0])
+    turned = np.array([(0, 0, 1), (1, 0, 0), (0, 1, 0)])
+    for name, place, turn in (
+        ("root", (1.0, 2.0, 3.0), root),
+        ("stiff", (1.0, 2.0, 3.0), root),
+        ("arm", (1.0, 2.0, 3.0), arm),
+        ("tip", elbow, arm),
+        ("leg", elbow, leg),
+        ("tip_end", elbow + arm.apply([0.0, 0.0, 4.0]), None),
+        ("leg_end", elbow + leg.apply([0.0, -3.0, 0.0]), None),
+    ):
+        at = motion.index(name)
+        np.testing.assert_allclose(motion.positions[0, at], 12.7 * turned @ place, atol=1e-9, err_msg=name)
+        if turn is not None:
+            wanted = turned @ turn.as_matrix() @ turned.T
+            np.testing.assert_allclose(motion.rotations[0, at], wanted, atol=1e-9, err_msg=name)
+    assert motion.seconds == pytest.approx(1 / 120)
+
+
+def test_files_may_be_written_differently_and_mean_the_same(tmp_path: Path) -> None:
+    plain = read_acclaim(files(tmp_path))
+    other = SKELETON.replace("length 0.5", "length 0.50 in").replace("name thigh", "name thigh left")
+    other = other.replace("    dof rx\n", "    dof Rx\n").replace("order TX", "order tx")
+    np.testing.assert_array_equal(read_acclaim(files(tmp_path, other)).positions, plain.positions)
+
+
+@pytest.mark.parametrize("name", ["08.asf", "08_WALK.ASF", "08.ASF"])
+def test_the_skeleton_beside_a_motion_is_the_subjects_or_its_own(tmp_path: Path, name: str) -> None:
+    motion = files(tmp_path).rename(tmp_path / "08_walk.amc")
+    (tmp_path / "07.asf").rename(tmp_path / name)
+    (tmp_path / "09.asf").write_text("another's")
+    assert len(read_acclaim(motion).positions) == 2
+
+
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
@@ -118,6 +217,17 @@ def test_a_bones_axis_may_be_given_in_another_order_and_without_one(tmp_path: Pa
         ("asf", "axis 0 0 20 XYZ", "axis 0 0 20 XXZ", "'XXZ' is no order of axes"),
         ("asf", "length 0.5", "length 0", "line 4"),
         ("asf", "length 0.5", "length", "line 4"),
+        ("asf", "length 0.5", "length -1", "line 4: a unit of length of -1 is not above 0"),
+        ("asf", "     name shin\n", "", "line 30: bone '' lacks"),
+        ("asf", "     length 3\n", "", "line 30: bone 'shin' lacks"),
+        ("asf", "     length 3\n", "     length\n", "line 31: bone 'shin' lacks"),
+        ("asf", "     length 3\n", "     length -0.5\n", "line 31: bone 'shin' lacks"),
+        ("asf", "     direction 0 -1 0\n", "", "line 30: bone 'shin' lacks"),
+        ("asf", "axis 0 0 20 XYZ", "axis 0 0", "line 28: 2 numbers where 3 belong"),
+        ("asf", "root thigh\n    thigh shin", "shin thigh\n    thigh shin", "does not hang on the root"),
+        ("asf", SKELETON[SKELETON.index(":bonedata") :], ":hierarchy", "no bones"),
+        ("amc", "shin 0\n", "", "line 10: frame 2 lacks bone 'shin'"),
+        ("amc", FRAMES[FRAMES.index("1\n") :], "", "has no frames"),
         ("amc", "shin 40", "shin 40 1", "'07_01.amc', line 7: bone 'shin' has 2 numbers, not 1"),
         ("amc", "shin 40\n", "", "frame 1 lacks bone 'shin'"),
         ("amc", "shin 40", "tail 40", "no turning bone 'tail'"),
