@@ -4,6 +4,7 @@ import warnings
 from pathlib import Path
 
 import c3d
+import ezc3d
 import numpy as np
 import pytest
 
@@ -74,6 +75,46 @@ def test_units_and_rates_that_cannot_be_are_named(tmp_path: Path, unit: str, rat
     with pytest.raises(StudioError, match=words) as no:
         read_c3d(written(tmp_path, motion(unit, rate)))
     assert "mm, cm or m" in no.value.hint
+
+
+@pytest.mark.parametrize("rate", [1.0, 10_000.0])
+def test_the_least_and_the_greatest_rate_are_read(tmp_path: Path, rate: float) -> None:
+    assert read_c3d(written(tmp_path, motion(rate=rate))).rate == rate
+
+
+@pytest.mark.parametrize(("up", "screen"), [("y", ["+Z", "+Y"]), ("z", ["+X", "+Z"])])
+def test_a_file_says_how_it_is_seen_and_what_wrote_it(tmp_path: Path, up: str, screen: list[str]) -> None:
+    content = ezc3d.c3d(str(written(tmp_path, motion(), up)))
+    settings = content["parameters"]
+    point = settings["POINT"]
+    assert [point["X_SCREEN"]["value"], point["Y_SCREEN"]["value"]] == [[screen[0]], [screen[1]]]
+    assert point["DESCRIPTIONS"]["value"] == list(NAMES)
+    assert settings["MANUFACTURER"]["SOFTWARE"]["value"] == ["capture studio"]
+    assert settings["STUDIO"]["RUN"]["value"] == ["walk/run-1"]
+    residuals = content["data"]["meta_points"]["residuals"][0].T
+    np.testing.assert_array_equal(residuals, np.where(np.isnan(motion().positions[..., 0]), -1.0, 0.0))
+
+
+def changed(folder: Path, **settings: list[object]) -> Path:
+    content = ezc3d.c3d(str(written(folder, motion())))
+    for name, value in settings.items():
+        content["parameters"]["POINT"][name]["value"] = value
+    content.write(str(folder / "changed.c3d"))
+    return folder / "changed.c3d"
+
+
+@pytest.mark.parametrize("unit", [[], [" "], [" MM "]])
+def test_points_without_a_unit_are_in_millimetres(tmp_path: Path, unit: list[object]) -> None:
+    found = read_c3d(changed(tmp_path, UNITS=unit))
+    assert found.unit == "mm"
+    np.testing.assert_allclose(found.positions, motion().positions, rtol=1e-6)
+
+
+def test_a_point_that_lies_too_far_away_is_named(tmp_path: Path) -> None:
+    given = motion("m")
+    given.positions[3, 2, 1] = 10_001.0
+    with pytest.raises(StudioError, match=r"marker 'RAnkle' is at .* mm in row 4"):
+        read_c3d(written(tmp_path, given))
 
 
 def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:

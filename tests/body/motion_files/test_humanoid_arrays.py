@@ -50,14 +50,46 @@ def test_a_small_tree_stands_where_scipy_puts_it(tmp_path: Path) -> None:
     assert motion.fps == 60.0
 
 
-def test_frames_held_twice_count_once(tmp_path: Path) -> None:
+MOVING = ("rotation_local_xyzw", "root_translation_m")
+
+
+@pytest.mark.parametrize("times", [2, 3, 4])
+def test_frames_held_several_times_count_once(tmp_path: Path, times: int) -> None:
     once = arrays()
-    twice = {name: np.repeat(once[name], 2, axis=0) for name in ("rotation_local_xyzw", "root_translation_m")}
-    motion = read_humanoid_arrays(written(tmp_path, once | twice))
-    assert motion.fps == 30.0
+    held = {name: np.repeat(once[name], times, axis=0) for name in MOVING}
+    motion = read_humanoid_arrays(written(tmp_path, once | held))
+    assert motion.fps == 60.0 / times
     assert len(motion.positions) == FRAMES
     single = read_humanoid_arrays(written(tmp_path, once))
     np.testing.assert_array_equal(motion.positions, single.positions)
+
+
+@pytest.mark.parametrize(("frames", "kept"), [(4, 4), (5, 3), (6, 3), (7, 4)])
+def test_few_frames_that_are_alike_were_held_still(tmp_path: Path, frames: int, kept: int) -> None:
+    once = arrays()
+    held = {name: np.repeat(once[name], 2, axis=0)[:frames] for name in MOVING}
+    assert len(read_humanoid_arrays(written(tmp_path, once | held)).positions) == kept
+
+
+def test_a_held_root_alone_is_no_repetition(tmp_path: Path) -> None:
+    once = arrays()
+    for name in MOVING:
+        still = {name: np.repeat(once[name][:1], FRAMES, axis=0)}
+        motion = read_humanoid_arrays(written(tmp_path, once | still))
+        assert (len(motion.positions), motion.fps, motion.source) == (FRAMES, 60.0, "tiny.npz")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"fps": np.float64(1.0)},
+        {"fps": np.float64(1000.0)},
+        {"rotation_local_xyzw": 1.0009 * np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 3, 1))},
+        {"rotation_local_xyzw": 0.9991 * np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 3, 1))},
+    ],
+)
+def test_what_is_just_right_is_read(tmp_path: Path, change: dict[str, Any]) -> None:
+    assert read_humanoid_arrays(written(tmp_path, arrays(**change))).names == ("pelvis", "thigh", "shin")
 
 
 @pytest.mark.parametrize(
@@ -72,6 +104,25 @@ def test_frames_held_twice_count_once(tmp_path: Path) -> None:
         ({"parent_indices": np.array([-1, 2, 0])}, "earlier joints"),
         ({"parent_indices": np.array([-1, -1, 0])}, "earlier joints"),
         ({"fps": np.int32(0)}, "entry 'fps'"),
+        ({"fps": np.int32(1001)}, "entry 'fps'"),
+        ({"fps": np.array([60.0])}, "entry 'fps'"),
+        ({"rotation_local_xyzw": 1.0011 * np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 3, 1))}, "not of length 1"),
+        ({"rotation_local_xyzw": 0.9989 * np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 3, 1))}, "not of length 1"),
+        ({"rotation_local_xyzw": np.full((FRAMES, 3, 4), np.nan)}, "not of length 1"),
+        (
+            {
+                name: np.zeros((0, *size))
+                for name, size in (("rotation_local_xyzw", (3, 4)), ("root_translation_m", (3,)))
+            },
+            "entry 'rotation_local_xyzw' has shape (0, 3, 4)",
+        ),
+        (
+            {"local_translation_m": np.ones((2, 3))},
+            "entry 'local_translation_m' has shape (2, 3), not (3, 3)",
+        ),
+        ({"parent_indices": np.array([-1, 0])}, "entry 'parent_indices' has shape (2,), not (3,)"),
+        ({"parent_indices": np.array([0, 0, 1])}, "earlier joints"),
+        ({"parent_indices": np.array([-1, 1, 0])}, "earlier joints"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, Any], words: str) -> None:

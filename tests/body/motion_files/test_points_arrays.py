@@ -141,6 +141,183 @@ def test_label3d_and_dannce(tmp_path: Path) -> None:
         read_truth(tmp_path / "d.mat", FPS)
 
 
+def stored(path: Path, **entries: object) -> Path:
+    """An HDF5 file of entries by their paths."""
+    with h5py.File(path, "w") as file:
+        for name, values in entries.items():
+            file[name] = values
+    return path
+
+
+def names_of(*names: str) -> np.ndarray:
+    return np.array(names, dtype=object)
+
+
+def refused(path: Path, words: str) -> None:
+    with pytest.raises(TruthError, match=words):
+        read_truth(path, FPS)
+
+
+def test_what_sleap_may_lack_or_have_too_much_of(tmp_path: Path) -> None:
+    tracks = PLACES.transpose(2, 1, 0)[None]
+    refused(stored(tmp_path / "a.h5", tracks=tracks), "no names")
+    refused(stored(tmp_path / "b.h5", node_names=names_of(*NAMES)), "no HDF5 file of points that is known")
+    two = np.concatenate([tracks, tracks])
+    refused(stored(tmp_path / "c.h5", tracks=two, node_names=names_of(*NAMES)), "pixels or several bodies")
+    refused(
+        stored(tmp_path / "d.h5", tracks=tracks[0], node_names=names_of(*NAMES)), "pixels or several bodies"
+    )
+    refused(stored(tmp_path / "e.h5", tracks=tracks, node_names=names_of("nose")), "pixels or several bodies")
+    with h5py.File(tmp_path / "f.h5", "w") as file:
+        file.create_dataset("tracks", (1, 3, 100, 600_000), "f8", chunks=(1, 3, 100, 100))
+        file["node_names"] = names_of(*NAMES)
+    refused(tmp_path / "f.h5", "'tracks' has")
+
+
+def test_a_table_of_deeplabcut_has_other_columns_and_entries_beside_it(tmp_path: Path) -> None:
+    """Frames that were left out, a column of likelihoods, another entry before the table."""
+    columns = pandas.MultiIndex.from_product([["D"], NAMES, ["likelihood", "z", "y", "x"]])
+    values = np.concatenate([np.full((FRAMES, 2, 1), 0.9), PLACES[..., ::-1]], axis=2).reshape(FRAMES, -1)
+    expected = np.full((9, 2, 3), np.nan)
+    at = [1, 2, 4, 5, 7, 8]
+    expected[at] = PLACES
+    for kind in ("table", "fixed"):
+        table = pandas.DataFrame(values, index=at, columns=columns)
+        table.to_hdf(tmp_path / "a.h5", key="table", format=kind, mode="w")
+        with h5py.File(tmp_path / "a.h5", "a") as file:
+            file["a_number"] = 1.0
+            file.create_group("a_group")
+        same(tmp_path / "a.h5", NAMES, expected)
+        table.index = [f"img{number}.png" for number in range(FRAMES)]
+        table.to_hdf(tmp_path / "b.h5", key="table", format=kind, mode="w")
+        same(tmp_path / "b.h5")
+
+
+def estimate(file: h5py.File, name: str = "Pose", unit: str = "meters", **more: object) -> None:
+    """A pose estimate of ndx-pose. more : entries of the first series, or `conversion` of its data."""
+    group = file.create_group(f"processing/behavior/{name}")
+    group.attrs["neurodata_type"] = "PoseEstimation"
+    conversion = more.pop("conversion", None)
+    for number, point in enumerate(NAMES):
+        series = group.create_group(point)
+        series["data"] = PLACES[:, number] / 1000.0
+        series["data"].attrs["unit"] = unit
+        if conversion is not None:
+            series["data"].attrs["conversion"] = conversion
+        for key, value in more.items():
+            series[key] = value
+        if "starting_time" in more:
+            series["starting_time"].attrs["rate"] = 25.0
+    group["description"] = "words"
+    group.create_group("skeleton")
+
+
+def test_pose_estimates_have_a_unit_a_factor_and_times_of_their_own(tmp_path: Path) -> None:
+    expected = np.full((13, 2, 3), np.nan)
+    expected[2::2] = PLACES
+    cases = {
+        "stamps": {"timestamps": np.arange(1, 7) / 25.0},
+        "begun": {"starting_time": 1 / 25.0},
+        "factor": {"timestamps": np.arange(1, 7) / 25.0, "unit": "", "conversion": 1000.0},
+    }
+    for name, given in cases.items():
+        path = tmp_path / f"{name}.nwb"
+        with h5py.File(path, "w") as file:
+            file["processing/0 words"] = 1.0
+            other = file.create_group("processing/1 other/thing")
+            other.attrs["neurodata_type"] = "TimeSeries"
+            file["processing/1 other/number"] = 1.0
+            estimate(file, **given)
+        same(path, NAMES, expected)
+        assert read_truth(path, FPS).unit == ("" if name == "factor" else "m")
+
+
+def test_pose_estimates_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    for name, change in {"lengths": np.zeros((3, 3)), "none": None, "plane": "plane"}.items():
+        with h5py.File(tmp_path / f"{name}.nwb", "w") as file:
+            estimate(file, timestamps=np.arange(6) / 25.0)
+            group = file["processing/behavior/Pose"]
+            for point in NAMES if change is None or name == "plane" else NAMES[1:]:
+                del group[point]["data"]
+                if change is not None:
+                    group[point]["data"] = np.zeros((6, 2)) if name == "plane" else change
+                    group[point]["data"].attrs["unit"] = "mm"
+        words = "pixels" if name == "plane" else "different lengths"
+        refused(tmp_path / f"{name}.nwb", words)
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"),
+    [
+        ([-1.0], "frames that no footage has"),
+        ([np.nan], "no frames"),
+        ([500_001.0], "no footage has"),
+    ],
+)
+def test_frames_that_no_footage_has_are_refused(tmp_path: Path, frames: list[float], words: str) -> None:
+    label = {"data_3d": np.ones((len(frames), 6)), "data_frame": np.array(frames)}
+    scipy.io.savemat(tmp_path / "a.mat", {"labelData": label})
+    refused(tmp_path / "a.mat", words)
+
+
+def test_too_many_points_and_frames_are_refused(tmp_path: Path) -> None:
+    label = {"data_3d": np.ones((1, 3 * 101)), "data_frame": 500_000.0}
+    scipy.io.savemat(tmp_path / "a.mat", {"labelData": label})
+    refused(tmp_path / "a.mat", "has 101 points and 500001 frames")
+
+
+def test_label3ds_files_have_one_camera_or_several_and_names_that_fit(tmp_path: Path) -> None:
+    label = {"data_3d": PLACES[[1, 4]].reshape(2, 6), "data_frame": np.array([1, 4])}
+    expected = np.full((5, 2, 3), np.nan)
+    expected[[1, 4]] = PLACES[[1, 4]]
+    names = {"joint_names": names_of("nose", "tail", "ear")}
+    scipy.io.savemat(tmp_path / "a.mat", {"labelData": label, "skeleton": names})
+    same(tmp_path / "a.mat", ("point1", "point2"), expected)
+    for number, wrong in enumerate(({"data_3d": 1.0}, {"data_frame": 1.0}, 3.0)):
+        scipy.io.savemat(tmp_path / f"{number}.mat", {"labelData": wrong})
+        refused(tmp_path / f"{number}.mat", "without data_3d and data_frame")
+    scipy.io.savemat(tmp_path / "b.mat", {"data_3D": PLACES.reshape(FRAMES, 6)})
+    refused(tmp_path / "b.mat", "no points of label3d")
+    for number, shape in enumerate([(FRAMES, 2, 3), (FRAMES, 3), (FRAMES, 3, 2, 2)]):
+        scipy.io.savemat(tmp_path / f"p{number}.mat", {"pred": np.ones(shape)})
+        refused(tmp_path / f"p{number}.mat", "pred of shape")
+    scipy.io.savemat(tmp_path / "c.mat", {"pred": PLACES.transpose(0, 2, 1)})
+    assert "counted from 0" in read_truth(tmp_path / "c.mat", FPS).notes[0]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.ones((0, 33, 3)),
+        np.ones((6, 33)),
+        np.ones((6, 33, 2)),
+        np.full((6, 33, 3), True),
+        np.ones((6, 32, 3)),
+    ],
+)
+def test_arrays_that_are_no_points_of_a_body_are_refused(tmp_path: Path, values: np.ndarray) -> None:
+    np.save(tmp_path / "a.npy", values)
+    refused(tmp_path / "a.npy", "a.npy")
+    assert MEDIAPIPE[0] == "nose"
+
+
+def test_part_of_a_place_is_none_and_zeros_are_said(tmp_path: Path) -> None:
+    values = np.random.default_rng(1).uniform(1.0, 900.0, (FRAMES, 33, 3))
+    values[2, 3, 1] = np.nan
+    values[3, 4] = 0.0
+    np.save(tmp_path / "a.npy", values)
+    wanted = values.copy()
+    wanted[2, 3] = wanted[3, 4] = np.nan
+    same(tmp_path / "a.npy", MEDIAPIPE, wanted)
+    assert "0 0 0 for a marker 1 times" in read_truth(tmp_path / "a.npy", FPS).notes[0]
+    values[0, 0, 0] = 2e7
+    np.save(tmp_path / "a.npy", values)
+    refused(tmp_path / "a.npy", "marker 'nose' is at")
+    whole = np.arange(1, 6 * 99 + 1).reshape(6, 33, 3)
+    np.save(tmp_path / "b.npy", whole)
+    same(tmp_path / "b.npy", MEDIAPIPE, whole)
+
+
 def test_rows_without_numbers_are_counted(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("nose_x,nose_y,nose_z,extra\n1,2,3,9\n4,5,6,9\n")
     motion = read_truth(tmp_path / "a.csv", FPS)

@@ -69,6 +69,54 @@ def test_metres_and_seconds(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "names", "places"),
+    [
+        # Cells that are blank at the end of a row, and one row shorter than its header but for them.
+        ("frame,A_x,A_y,A_z,,\n0,1,2,3,,\n1,4,5,6,,\n", "A", [[[1, 2, 3]], [[4, 5, 6]]]),
+        ("frame,A_x,A_y,A_z\n0,1,2,3,,\n", "A", [[[1, 2, 3]]]),
+        # A column that is none of a coordinate between those that are, and points with axes in any order.
+        ("A_z,note,A_x,A_y,B.x,B.y,B.z,frame\n3,s,1,2,4,5,6,0\n", "A B", [[[1, 2, 3], [4, 5, 6]]]),
+        # In a table with a row a point, columns with a point's name are others.
+        ("frame,name,x,y,z,A_x,A_y,A_z\n0,B,1,2,3,7,8,9\n", "B", [[[1, 2, 3]]]),
+        # In one with a row a frame, columns without are.
+        ("frame,x,y,z,A_x,A_y,A_z\n0,1,2,3,7,8,9\n", "A", [[[7, 8, 9]]]),
+        # Rows are counted from 0 where nothing numbers them.
+        ("A_x,A_y,A_z\n1,2,3\n\n4,5,6\n", "A", [[[1, 2, 3]], [[4, 5, 6]]]),
+        ("time,A_x,A_y,A_z\n0,1,2,3\n0.04,4,5,6\n", "A", [[[1, 2, 3]], [[4, 5, 6]]]),
+        ("timestamp,A_x,A_y,A_z\n0.049,1,2,3\n", "A", [[[np.nan] * 3], [[1, 2, 3]]]),
+        # Frames go before times.
+        ("time,frame,A_x,A_y,A_z\n9,0,1,2,3\n", "A", [[[1, 2, 3]]]),
+        ("frame,A_x,A_y,A_z\n1.0,1,2,3\n", "A", [[[np.nan] * 3], [[1, 2, 3]]]),
+        ("frame,A_x_cm,A_y_cm,A_z_cm\n0,1,2,3\n", "A", [[[10, 20, 30]]]),
+        ("# made\n\nframe;A_x;A_y;A_z\n0;1,5;-2,5;0\n# end\n", "A", [[[1.5, -2.5, 0]]]),
+        ("frame\tA_x\tA_y\tA_z\n0\t1,5\t2\t3\n", "A", [[[1.5, 2, 3]]]),
+    ],
+)
+def test_tables_are_read_as_they_are_meant(
+    tmp_path: Path, text: str, names: str, places: list[list[list[float]]]
+) -> None:
+    motion = read_points(written(tmp_path, text), 25.0)
+    assert motion.names == tuple(names.split())
+    np.testing.assert_allclose(motion.positions, places)
+    np.testing.assert_allclose(motion.times, np.arange(len(places)) / 25.0)
+    assert motion.rate == 25.0
+
+
+def test_zeros_and_rows_that_were_counted_are_said(tmp_path: Path) -> None:
+    motion = read_points(written(tmp_path, "A_x,A_y,A_z\n0,0,0\n1,2,3\n"), 25.0)
+    assert np.isnan(motion.positions[0]).all()
+    assert ["taken for missing" in motion.notes[0], "counted from 0" in motion.notes[1]] == [True, True]
+    assert not read_points(written(tmp_path, LONG), 25.0).notes
+
+
+def test_the_last_frame_that_may_be_is_read(tmp_path: Path) -> None:
+    text = "frame,A_x,A_y,A_z\n{},1,2,3\n"
+    assert len(read_points(written(tmp_path, text.format(500_000)), 25.0).times) == 500_001
+    with pytest.raises(TruthError, match="'500001' is no frame"):
+        read_points(written(tmp_path, text.format(500_001)), 25.0)
+
+
+@pytest.mark.parametrize(
     ("text", "cause"),
     [
         ("", "no rows"),
@@ -85,6 +133,13 @@ def test_metres_and_seconds(tmp_path: Path) -> None:
         ("frame,point,x,y,z\n0,Nose,1,,3\n", "y of point 'Nose' is ''"),
         ("frame,point,x,y,z\n0,Nose,1,inf,3\n", "'inf'"),
         ("frame,point,x,y,z\n0,Nose,1,1e12,3\n", "1e\\+12"),
+        ("frame,A_x_mm,A_y_mm,A_z_mm,B_x,B_y,B_z\n0,1,2,3,1,2,3\n", "no unit"),
+        ("frame,x,y,z\n0,1,2,3\n", "no columns of coordinates"),
+        ("name,x,y,z\nA,1,2,3\n", "no column of frames"),
+        ("frame,A_x,A_y,A_z\n0,,2,3\n", "x of point 'A' is ''"),
+        ("frame,A_x,A_y,A_z\n0,-1e8,2,3\n", "is at -1e.08 mm in row 1"),
+        ("time,A_x,A_y,A_z\nnan,1,2,3\n", "line 2: 'nan' is no time"),
+        ("\n\nframe,point,x,y,z\n0,,1,2,3\n", "line 4 names no point"),
         ("frame,point,x,y,z\n0,,1,2,3\n", "names no point"),
         ("frame,point,x,y,z\n-1,Nose,1,2,3\n", "'-1' is no frame"),
         ("frame,point,x,y,z\n0.5,Nose,1,2,3\n", "'0.5' is no frame"),

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.body.motion_files.trc import MarkerMotion, read_trc, write_trc
+from studio.body.motion_files.trc import MarkerMotion, number_or_nan, read_trc, write_trc
 from studio.foundations.errors import TruthError
 
 HEADER = (
@@ -105,6 +105,114 @@ def test_a_broken_row_is_named(tmp_path: Path, rows: str, message: str) -> None:
 def test_a_broken_header_is_named(tmp_path: Path, change: tuple[str, str], message: str) -> None:
     with pytest.raises(TruthError, match=message):
         read_trc(written(tmp_path, header=HEADER.replace(*change)))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("60\t60\t2\t2", "0\t60\t2\t2"), "a DataRate of 0"),
+        (("60\t60\t2\t2", "-1\t60\t2\t2"), "a DataRate of -1"),
+        (("60\t60\t2\t2", "inf\t60\t2\t2"), "no DataRate"),
+        (("60\t60\t2\t2", "60\t60\tx\t2"), "no NumFrames"),
+        (("60\t60\t2\t2", "60\t60\t2\t1"), "2 markers and line 3 says 1"),
+        (("Hip\t\t\tNeck", "\t\t\tNeck"), "names 1 markers and line 3 says 2"),
+        (("Hip\t\t\tNeck", "\t\t\t"), "names 0 markers and line 3 says 2"),
+        (("2\t2\t{unit}", "2\t0\t{unit}"), "2 markers and line 3 says 0"),
+    ],
+)
+def test_a_headers_numbers_must_fit(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    assert change[0] in HEADER
+    with pytest.raises(TruthError, match=message):
+        read_trc(written(tmp_path, header=HEADER.replace(*change)))
+
+
+def test_a_table_without_markers_is_refused(tmp_path: Path) -> None:
+    header = HEADER.replace("2\t2\t{unit}", "2\t0\t{unit}").replace("Hip\t\t\tNeck", "\t\t\t")
+    with pytest.raises(TruthError, match="names 0 markers and line 3 says 0"):
+        read_trc(written(tmp_path, header=header))
+
+
+def test_a_header_that_announces_fewer_rows_or_more_cells_is_taken(tmp_path: Path) -> None:
+    header = HEADER.replace("60\t60\t2\t2", "60\t60\t1\t2").replace("Neck\t\t\n", "Neck\t\t\t\t\t\n")
+    assert len(read_trc(written(tmp_path, header=header)).positions) == 2
+    with pytest.raises(TruthError, match="has 0 rows and its header says 0"):
+        read_trc(written(tmp_path, "", header=HEADER.replace("60\t60\t2", "60\t60\t0")))
+
+
+def test_the_row_whose_time_does_not_rise_is_named(tmp_path: Path) -> None:
+    rows = "".join(f"{n}\t{time}\t1\t2\t3\t4\t5\t6\n" for n, time in enumerate((0.0, 0.1, 0.2, 0.1, 0.3), 1))
+    with pytest.raises(TruthError, match=r"row 4 \(0\.1 s\) does not rise"):
+        read_trc(written(tmp_path, rows))
+
+
+@pytest.mark.parametrize(
+    ("cells", "is_missing"),
+    [
+        *(
+            ((f"{sign}{'9' * digits}",) * 3, 4 <= digits <= 8)
+            for digits in range(3, 10)
+            for sign in ("", "-")
+        ),
+        (("9999", "9999", "99999"), False),
+        (("0", "0", "1"), False),
+        (("0", "0.0", "-0"), True),
+        (("5", "5", "5"), False),
+    ],
+)
+def test_three_zeros_and_three_times_the_same_nines_are_missing(
+    tmp_path: Path, cells: tuple[str, str, str], is_missing: bool
+) -> None:
+    path = written(tmp_path, ROWS.replace("4.5\t5.5\t6.5", "\t".join(cells)), unit="cm")
+    if max(map(len, cells)) >= 9 and not is_missing:
+        with pytest.raises(TruthError, match=r"marker 'Neck' is at .* mm in row 2"):
+            read_trc(path)
+        return
+    motion = read_trc(path)
+    assert np.isnan(motion.positions[1, 1]).all() == is_missing
+    assert np.isfinite(motion.positions[1, 1]).all() != is_missing
+    assert np.isfinite(motion.positions[[0, 0, 1], [0, 1, 0]]).all()
+    value = "0 0 0" if cells[0] == "0" else f"{cells[0]} three times"
+    notes = (f"'walk.trc' has {value} for a marker 1 times: taken for missing.",) if is_missing else ()
+    assert motion.notes == notes
+
+
+@pytest.mark.parametrize(("metres", "is_read"), [("9999.9", True), ("10000.1", False), ("-10000.1", False)])
+def test_places_beyond_ten_kilometres_are_refused(tmp_path: Path, metres: str, is_read: bool) -> None:
+    path = written(tmp_path, ROWS.replace("5.5", metres))
+    if is_read:
+        read_trc(path)
+        return
+    with pytest.raises(TruthError, match=r"marker 'Neck' is at -?1\.00001e\+07 mm in row 2"):
+        read_trc(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("1,5", 1.5), ("1.5", 1.5), ("1,000.5", None), ("1e3", 1000.0), ("x", None)]
+)
+def test_a_comma_is_a_decimal_one_where_there_is_no_point(text: str, value: float | None) -> None:
+    assert number_or_nan(text) == pytest.approx(np.nan if value is None else value, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("unit", "rows"),
+    [
+        ("mm", "1\t0.00000000\t0.5000\t-2000.0000\t1.2346\t\t\t\n"
+               "2\t0.01333333\t0.0001\t0.0000\t0.0000\t7.0000\t8.0000\t-0.0000\n"),
+        ("m", "1\t0.00000000\t0.0005000\t-2.0000000\t0.0012346\t\t\t\n"
+              "2\t0.01333333\t0.0000001\t0.0000000\t0.0000000\t0.0070000\t0.0080000\t-0.0000000\n"),
+    ],
+)  # fmt: skip
+def test_a_table_is_written_to_the_last_letter(tmp_path: Path, unit: str, rows: str) -> None:
+    places = np.array(
+        [[[1.23456, 0.5, -2000.0], [np.nan] * 3], [[0.00003, 0.0, 0.00004], [-0.00001, 7.0, 8.0]]]
+    )
+    places[1, 0] *= 1.0 if unit == "mm" else 1e-3
+    write_trc(tmp_path / "out.trc", MarkerMotion(("A", "B"), np.arange(2) / 75.0, places, unit, 75.0))
+    assert (tmp_path / "out.trc").read_text() == (
+        "PathFileType\t4\t(X/Y/Z)\tout.trc\n"
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
+        f"75\t75\t2\t2\t{unit}\t75\t1\t2\nFrame#\tTime\tA\t\t\tB\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n{rows}"
+    )
 
 
 def test_binary_rubbish_is_no_trc(tmp_path: Path) -> None:
