@@ -32,7 +32,7 @@ from studio.foundations.errors import BodyError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 
-SIZE_SPREAD = 0.5
+SIZE_SPREAD = 0.3
 """Standard deviation of a dimension's share of the body, before anything was seen."""
 ANGLE_SPREAD = 1.0
 """Radians, of an angle below the root from its rest value."""
@@ -41,6 +41,12 @@ BEYOND = math.radians(30.0)
 TIP = " tip"
 SHRUNK, GROWN = 0.05, 20.0
 """Factors between which a dimension may change."""
+TOLD = 0.8
+"""Share of a size that the clicks decided, from which it counts as told."""
+USUAL_NOISE, LEAST_NOISE, NOISIER = 2.0, 0.5, 1.5
+"""Pixels, standard deviation of a click, as expected and at least; the factor by which it may be another one."""
+ALIKE = 0.05
+"""Share by which the body's scale may differ from that of the sizes told."""
 TOLD_ANGLE = 0.2
 """Share of an angle's spread below which its value is told."""
 FRAMES_LOOKED_AT = 3
@@ -74,6 +80,7 @@ class FilmFit:
     values : (G,) of the groups of dimensions, mm; deviations : (G,) their standard deviations, mm, by the clicks'
         scatter alone; told : (G,) 0 to 1, the share of the answer that the clicks decided.
     turns : (D,) which parameters' values the clicks decided.
+    noise : standard deviation of a click, pixels.
     """
 
     body: BodyModel
@@ -84,6 +91,7 @@ class FilmFit:
     deviations: Array
     told: Array
     turns: Mask
+    noise: float
 
 
 def landmark_names(body: BodyModel) -> tuple[str, ...]:
@@ -220,19 +228,29 @@ def fit_film(
     frames: Sequence[FrameClicks],
     *,
     held: bool = False,
-    pixel_spread: float = 2.0,
 ) -> FilmFit:
-    """Sizes of the tree and its pose in each frame. held : the root is in the same place in all frames. pixel_spread :
-    standard deviation of a click, expected.
-    """
-    scale = tree.scale(frames)
+    """Sizes of the tree and its pose in each frame. held : the root is in the same place in all frames."""
+    scale, sigma = tree.scale(frames), USUAL_NOISE
     factors = np.ones(len(tree.groups))
     poses = first_poses(tree, tree.sized(scale, {}), frames)
-    problem = _Problem(tree, cameras, frames, scale, held=held, sigma=pixel_spread, sized=True)
-    factors, poses = problem.solved(factors, poses)
-    # A frame that fits far worse than the rest stands in a wrong turn of its limbs: others' poses are tried.
-    poses = problem.retried(factors, poses)
-    return problem.fit(*problem.solved(factors, poses))
+    for last in (False, False, True):
+        problem = _Problem(tree, cameras, frames, scale, held=held, sigma=sigma, sized=True)
+        factors, poses = problem.solved(factors, poses)
+        # A frame that fits far worse than the rest stands in a wrong turn of its limbs: others' poses are tried.
+        poses = problem.retried(factors, poses)
+        fit = problem.fit(*problem.solved(factors, poses))
+        ratio = _rescaled(tree, fit)
+        if last or (abs(ratio - 1.0) < ALIKE and 1.0 / NOISIER < fit.noise / sigma < NOISIER):
+            break
+        scale, factors, poses, sigma = scale * ratio, factors / ratio, fit.poses, max(fit.noise, LEAST_NOISE)
+    return fit
+
+
+def _rescaled(tree: FilmedTree, fit: FilmFit) -> float:
+    """The body's scale by the sizes that are told, beside that to which the others were pulled."""
+    told = fit.told >= TOLD
+    template = np.array([np.mean([tree.lengths[name] for name in group]) for group in tree.groups])
+    return float(np.median((fit.values / template)[told])) / fit.scale if told.any() else 1.0
 
 
 def fit_poses(
@@ -241,11 +259,10 @@ def fit_poses(
     frames: Sequence[FrameClicks],
     body: BodyModel,
     near: Sequence[Array],
-    pixel_spread: float = 2.0,
 ) -> FilmFit:
     """The poses of a body of known sizes in frames. near : poses (D,) to begin with, besides the rest pose."""
     fixed = FilmedTree(body, tree.names)
-    problem = _Problem(fixed, cameras, frames, 1.0, held=False, sigma=pixel_spread, sized=False)
+    problem = _Problem(fixed, cameras, frames, 1.0, held=False, sigma=USUAL_NOISE, sized=False)
     none = np.ones(0)
     poses = problem.solved(none, first_poses(fixed, fixed.body, frames))[1]
     return problem.fit(none, problem.retried(none, poses, near))
@@ -497,12 +514,21 @@ class _Problem:
         chosen[wanted, np.arange(len(wanted))] = 1.0
         spread: Array = scipy.sparse.linalg.splu(both.tocsc()).solve(chosen)[wanted, np.arange(len(wanted))]
         residuals = np.concatenate([one.ravel() for one in off]) / self.sigma
-        noise = float(np.sqrt((residuals**2).sum() / max(1, len(residuals) - self.unknowns)))
+        noise = self.sigma * float(np.sqrt((residuals**2).sum() / max(1, len(residuals) - self.unknowns)))
         told = np.clip(1.0 - spread[:count] / SIZE_SPREAD**2, 0.0, 1.0)
-        deviations = values / np.maximum(factors, SHRUNK) * np.sqrt(np.maximum(spread[:count], 0.0)) * noise
+        own = noise / self.sigma * np.sqrt(np.maximum(spread[:count], 0.0))
+        deviations = values / np.maximum(factors, SHRUNK) * own
         turns = np.zeros(len(self.base.parameters), dtype=np.bool_)
         angles = np.median(spread[count:].reshape(looked.shape), axis=0)
         turns[self.tree.free] = angles < TOLD_ANGLE * ANGLE_SPREAD**2
         return FilmFit(
-            body, poses, tuple(off), self.scale, np.asarray(values, np.float64), deviations, told, turns
+            body,
+            poses,
+            tuple(off),
+            self.scale,
+            np.asarray(values, np.float64),
+            deviations,
+            told,
+            turns,
+            noise,
         )

