@@ -47,15 +47,16 @@ def made(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> FilmedBod
 def test_the_tail_is_as_long_as_its_labels_lie_apart(made: FilmedBody) -> None:
     limbs = {limb.limb: limb for limb in made.limbs}
     for name, apart in TAIL.items():
-        print(
-            f"{name} {limbs[name].length:.1f}, labels {limbs[name].mean:.1f} ± {limbs[name].scatter:.1f} of {apart:.0f}"
-        )
-        assert limbs[name].length == pytest.approx(apart, abs=2.0)
+        limb = limbs[name]
+        print(f"{name} {limb.length:.1f}, labels {limb.mean:.1f} ± {limb.scatter:.1f} of {apart:.0f}")
+        assert limb.length == pytest.approx(apart, abs=2.0)
         assert limb.scatter < 1.0
 
 
 def test_the_body_fits_the_frames_that_did_not_make_it_as_well(made: FilmedBody) -> None:
-    print(f"{made.off:.1f} ({made.off_most:.1f}) used, {made.checked_off:.1f} ({made.checked_off_most:.1f}) not used")
+    print(
+        f"{made.off:.1f} ({made.off_most:.1f}) used, {made.checked_off:.1f} ({made.checked_off_most:.1f}) not used"
+    )
     assert len(made.checked) == 52
     assert made.checked_off is not None
     assert made.checked_off < 8.0
