@@ -16,11 +16,19 @@ from studio.evidence.volume.hull_kernels import find_distances
 from studio.evidence.volume.hull_octree import summed_areas
 from studio.evidence.volume.reconstruction import radical_inverses
 from studio.evidence.yuv_background import YuvBackground, learn_background
+from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.camera_table import camera_table, picture_limit
 from studio.foundations.geometry.projection import distorted
 
 BARREL = ring(3)[0]
-CAMERA = dataclasses.replace(BARREL, distortion=np.array([*BARREL.distortion[:4], 0.02]))
+TURN = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+CAMERA = dataclasses.replace(
+    BARREL,
+    matrix=BARREL.matrix + np.array([[0.0, 7.0, 0.0], [0.0, 9.0, 0.0], [0.0, 0.0, 0.0]]),
+    distortion=np.array([*BARREL.distortion[:4], 0.02]),
+    rotation=TURN @ BARREL.rotation,
+    translation=TURN @ BARREL.translation + (40.0, -25.0, 0.0),
+)
 CAMERAS = camera_table([CAMERA], picture_limit)
 STARTS = np.array([[0, 320 * 240], [0, 321 * 241]])
 MIDDLE = np.array([0.0, 0.0, 900.0])
@@ -99,7 +107,12 @@ def plain_projection(centre: np.ndarray, half: float) -> dict[str, Any]:
         (px, py), (qx, qy) = axes[(axis + 1) % 3], axes[(axis + 2) % 3]
         faces.append(4.0 * abs(px * qy - py * qx))
     uv = m[0, 0] * xd + m[0, 1] * yd + m[0, 2], m[1, 1] * yd + m[1, 2]
-    return {"uv": uv, "depth": depth, "axes": axes, "sinks": sinks, "faces": faces}
+    reach = half * (abs(r[2, 0]) + abs(r[2, 1]) + abs(r[2, 2]))
+    bounds = [sum(abs(axis[i]) for axis in axes) * (depth / (depth - reach)) for i in (0, 1)]
+    seen = depth - reach >= 100.0 and square <= CAMERAS[0]["limit"]
+    return {
+        "uv": uv, "depth": depth, "axes": axes, "sinks": sinks, "faces": faces, "bounds": bounds, "seen": seen,
+    }  # fmt: skip
 
 
 def plain_samples(found: dict[str, Any], sampling: float) -> list[int]:
@@ -136,6 +149,12 @@ def test_sixteen_voxels_at_a_time_are_bit_for_bit_the_voxels_one_by_one(half: fl
         assert (rows[projection.U, lane], rows[projection.V, lane]) == found["uv"]
         assert axes.tolist() == [list(axis) for axis in found["axes"]]
         assert rows[projection.FACES : projection.FACES + 3, lane].tolist() == found["faces"]
+        assert rows[projection.AREA, lane] == sum(found["faces"])
+        assert rows[projection.DEPTH, lane] == found["depth"]
+        bounds = rows[projection.BOUND_X, lane], rows[projection.BOUND_Y, lane]
+        assert bounds == pytest.approx(found["bounds"], rel=1e-14)
+        assert rows[projection.SINKS : projection.SINKS + 3, lane].tolist() == found["sinks"]
+        assert bool(rows[projection.SEEN, lane]) == found["seen"]
         expected = plain_samples(found, sampling)
         assert rows[projection.COUNT, lane] == len(expected)
         assert pixels[: len(expected), lane].tolist() == expected
@@ -219,3 +238,213 @@ def test_a_mask_carves_only_what_covers_none_of_its_pixels() -> None:
             assert kernels.look_at_mask(sights()._replace(sums=sums), 0, rules(), place, 0) == expected
     summed_areas(np.full((240, 320), 255, np.uint8), sums)
     assert kernels.look_at_mask(sights()._replace(sums=sums), 0, rules(), place, 0) == kernels.FOREGROUND
+
+
+def turned_up(number: int, width: int, height: int) -> Camera:
+    """One of a ring, turned about its axis."""
+    camera = ring(3)[number]
+    cosine, sine = math.cos(0.4 * number + 0.3), math.sin(0.4 * number + 0.3)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return dataclasses.replace(
+        camera,
+        width=width,
+        height=height,
+        rotation=turn @ camera.rotation,
+        translation=turn @ camera.translation,
+    )
+
+
+VIEWS = [turned_up(0, 320, 240), turned_up(1, 320, 200), turned_up(2, 290, 240)]
+TABLE = camera_table(VIEWS, picture_limit)
+PIXELS = np.array([camera.width * camera.height for camera in VIEWS])
+CORNERS = np.array([(camera.width + 1) * (camera.height + 1) for camera in VIEWS])
+BEGINS = np.array([[0, *np.cumsum(PIXELS)], [0, *np.cumsum(CORNERS)]])
+
+
+def scene_of_masks(seed: int) -> tuple[kernels.Sights, list[np.ndarray]]:
+    """Discs in every view, as sums, and as distances where they are looked at by pixels."""
+    rng = np.random.default_rng(seed)
+    masks, sums = [], np.empty(BEGINS[1, -1], np.int32)
+    for number, camera in enumerate(VIEWS):
+        rows, columns = np.mgrid[: camera.height, : camera.width]
+        mask = np.zeros((camera.height, camera.width), np.uint8)
+        for x, y, radius in rng.uniform([0, 0, 20], [camera.width, camera.height, 90], (3, 3)):
+            mask[np.hypot(columns - x, rows - y) < radius] = 255
+        masks.append(mask)
+        summed_areas(mask, sums[BEGINS[1, number] : BEGINS[1, number + 1]])
+    picture = rng.integers(0, 256, (BEGINS[0, -1], 3), dtype=np.uint8)
+    inside = np.concatenate([mask.ravel() for mask in masks]) > 0
+    distances = np.where(inside, rng.uniform(2.0, 30.0, len(inside)), rng.uniform(0.0, 8.0, len(inside)))
+    given = False, TABLE, BEGINS, sums, picture, distances.astype(np.float32), HEIGHTS
+    return kernels.Sights(*given), masks
+
+
+def place_of(view: int, half: float, centre: np.ndarray) -> np.ndarray:
+    """(rows, 16) projections of a voxel."""
+    rows = np.ones((projection.ROWS, projection.LANES))
+    rows[projection.CENTRE : projection.CENTRE + 3] = centre[:, None]
+    projection.place_voxels(TABLE, view, half, rows.reshape(-1))
+    return rows
+
+
+def plain_mask_look(mask: np.ndarray, place: np.ndarray, row: kernels.Rules) -> tuple[int, float | None]:
+    """The answer of the rectangle around a voxel, pixel by pixel, and its share of foreground."""
+    height, width = mask.shape
+    u, v = place[projection.U], place[projection.V]
+    across, down = place[projection.BOUND_X], place[projection.BOUND_Y]
+    if row.last:
+        shrunk = math.sqrt(place[projection.AREA] / (4.0 * across * down))
+        across, down = across * shrunk, down * shrunk
+    columns = range(math.floor(u - across + 0.5), math.floor(u + across + 0.5) + 1)
+    rows = range(math.floor(v - down + 0.5), math.floor(v + down + 0.5) + 1)
+    pixels = [(y, x) for y in rows for x in columns]
+    within = [(y, x) for y, x in pixels if 0 <= y < height and 0 <= x < width]
+    if not within:
+        return kernels.UNSEEN, None
+    foreground = sum(mask[at] > 0 for at in within)
+    if row.last:
+        if not (-0.5 <= u < width - 0.5 and -0.5 <= v < height - 0.5):
+            return kernels.UNSEEN, None
+        enough = foreground > 0 and foreground >= row.edge_share * len(within)
+        return (kernels.FOREGROUND if enough else kernels.BACKGROUND), None
+    share = foreground / len(within)
+    if len(within) < len(pixels):
+        return kernels.EDGE, share
+    return {0: kernels.BACKGROUND, len(within): kernels.FOREGROUND}.get(foreground, kernels.EDGE), share
+
+
+def places(seed: int, count: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform([-1500, -1500, -600], [1500, 1500, 2600], (count, 3))
+
+
+@pytest.mark.parametrize("last", [False, True])
+def test_the_answer_of_a_mask_is_that_of_the_pixels_around_a_voxel(last: bool) -> None:
+    seen, masks = scene_of_masks(1)
+    row, answers = rules(last=last, share=0.5), []
+    for half in (4.0, 30.0, 110.0):
+        for centre in places(3, 160):
+            for view, mask in enumerate(masks):
+                rows = place_of(view, half, centre)
+                if not rows[projection.SEEN, 3]:
+                    continue
+                expected, share = plain_mask_look(mask, rows[:, 3], row)
+                assert kernels.look_at_mask(seen, view, row, rows.reshape(-1), 3) == expected
+                if share is not None:
+                    assert rows[projection.SHARE, 3] == share
+                answers.append(expected)
+    assert len(set(answers)) == (3 if last else 4)
+
+
+def plain_pixels_look(
+    distances: np.ndarray, view: int, place: np.ndarray, pixels: np.ndarray, row: kernels.Rules
+) -> tuple[int, float]:
+    """Eq. 6 over all samples, whose sums end where they decide."""
+    one, linear, square = row.polynomial
+    width, height = VIEWS[view].width, VIEWS[view].height
+    count, inside, far, total = int(place[projection.COUNT]), 0, 0, np.float32(0.0)
+    for pixel in pixels[:count].astype(int):
+        if pixel >= 0:
+            distance = distances[BEGINS[0, view] + pixel]
+            total, inside, far = total + distance, inside + 1, far + int(distance > np.float32(row.single))
+            if not row.last and total > one + count * (linear + count * square) and far < inside:
+                return kernels.EDGE, far / inside
+    if inside == 0:
+        u, v = place[projection.U], place[projection.V]
+        across, down = place[projection.BOUND_X], place[projection.BOUND_Y]
+        beside = u + across < 0 or u - across > width - 1 or v + down < 0 or v - down > height - 1
+        return (kernels.UNSEEN if row.last or beside else kernels.EDGE), 0.0
+    if total <= one + inside * (linear + inside * square):
+        return (kernels.EDGE if inside < count and not row.last else kernels.BACKGROUND), far / inside
+    if row.last:
+        return (kernels.FOREGROUND if far >= row.edge_share * inside else kernels.BACKGROUND), far / inside
+    everything = far == inside == count
+    return (kernels.FOREGROUND if everything else kernels.EDGE), far / inside
+
+
+@pytest.mark.parametrize("last", [False, True])
+def test_the_answer_of_pixels_is_equation_6_sample_by_sample(last: bool) -> None:
+    seen, _ = scene_of_masks(2)
+    seen = seen._replace(distances=np.where(seen.distances > 8.0, np.float32(40.0), seen.distances))
+    row, answers = rules(last=last, share=0.5), []
+    for half in (2.0, 30.0, 110.0):
+        for centre in places(4, 160):
+            for view, camera in enumerate(VIEWS):
+                rows = place_of(view, half, centre)
+                if not rows[projection.SEEN, 3]:
+                    continue
+                most = projection.count_samples(rows.reshape(-1), projection.LANES, 1.0)
+                pixels = np.empty((most, projection.LANES))
+                given = most, float(camera.width), float(camera.height), HEIGHTS, pixels.reshape(-1)
+                projection.sample_pixels(rows.reshape(-1), *given)
+                expected, share = plain_pixels_look(seen.distances, view, rows[:, 3], pixels[:, 3], row)
+                answer = kernels.look_at_pixels(seen, view, row, rows.reshape(-1), 3, pixels.reshape(-1))
+                assert answer == expected
+                assert rows[projection.SHARE, 3] == share
+                answers.append(expected)
+    assert len(set(answers)) == (3 if last else 4)
+
+
+@pytest.mark.parametrize("by_pixels", [False, True])
+@pytest.mark.parametrize(("last", "least_views"), [(False, 1), (False, 3), (True, 2)])
+def test_a_voxels_verdict_is_that_of_its_views_one_after_the_other(
+    by_pixels: bool, last: bool, least_views: int
+) -> None:
+    seen, masks = scene_of_masks(3)
+    inside = np.concatenate([mask.ravel() for mask in masks]) > 0
+    distances = np.where(inside, np.float32(40.0), np.float32(1.0))
+    seen = seen._replace(by_pixels=by_pixels, distances=distances)
+    rng, corner, edge = np.random.default_rng(5), np.array([-960.0, -960.0, -60.0]), 60.0
+    row = rules(last=last)._replace(least_views=least_views)
+    nodes = np.unique(rng.integers(0, 32, (400, 3)), axis=0).astype(np.int32)
+    states = np.zeros((len(nodes), 3), np.uint32)
+    states[:, 2] = rng.integers(0, 3, len(nodes))
+    states[rng.random(len(nodes)) < 0.2, 0 if not by_pixels else 1] |= np.uint32(2)
+    before, verdicts = states.copy(), np.full(len(nodes), 9, np.uint8)
+    kernels.judge(10, 330, nodes, states, verdicts, corner, edge, seen, row)
+    for index, node in enumerate(nodes):
+        sure, blind, begins = (int(value) for value in before[index])
+        if not 10 <= index < 330:
+            assert verdicts[index] == 9
+            assert (states[index] == before[index]).all()
+            continue
+        looked = edges = 0
+        least, first, carved = 2.0, begins, False
+        for turn in range(3):
+            view = (begins + turn) % 3
+            if sure >> view & 1:
+                looked += 1
+                continue
+            if blind >> view & 1:
+                continue
+            rows = place_of(view, 0.5 * edge, corner + (node + 0.5) * edge)
+            answer = kernels.UNSEEN
+            if rows[projection.SEEN, 0]:
+                if by_pixels:
+                    most = projection.count_samples(rows.reshape(-1), projection.LANES, 1.0)
+                    pixels = np.empty(most * projection.LANES)
+                    size = float(VIEWS[view].width), float(VIEWS[view].height)
+                    projection.sample_pixels(rows.reshape(-1), most, *size, HEIGHTS, pixels)
+                    answer = kernels.look_at_pixels(seen, view, row, rows.reshape(-1), 0, pixels)
+                else:
+                    answer = kernels.look_at_mask(seen, view, row, rows.reshape(-1), 0)
+            if answer == kernels.BACKGROUND:
+                carved = True
+                break
+            if answer == kernels.UNSEEN:
+                blind |= 1 << view
+                continue
+            looked += 1
+            if rows[projection.SHARE, 0] < least and not (last and not by_pixels):
+                least, first = rows[projection.SHARE, 0], view
+            edges += answer == kernels.EDGE
+            if answer == kernels.FOREGROUND and not by_pixels:
+                sure |= 1 << view
+        if carved or looked < least_views:
+            assert verdicts[index] == kernels.CARVED
+        else:
+            assert verdicts[index] == (kernels.SPLIT if edges else kernels.KEPT)
+        if not carved:
+            assert states[index, :2].tolist() == [sure, blind]
+            assert last or states[index, 2] == first
+    assert {kernels.CARVED, kernels.KEPT} <= set(verdicts.tolist())
+    assert last or kernels.SPLIT in verdicts
