@@ -13,7 +13,7 @@ from studio.evidence.volume import hull_kernels as kernels
 from studio.evidence.volume import hull_projection as projection
 from studio.evidence.volume.chi_square import fitted_thresholds
 from studio.evidence.volume.hull_kernels import find_distances
-from studio.evidence.volume.hull_octree import summed_areas
+from studio.evidence.volume.hull_octree import colour, first_look, summed_areas
 from studio.evidence.volume.reconstruction import radical_inverses
 from studio.evidence.yuv_background import YuvBackground, learn_background
 from studio.foundations.geometry.camera import Camera
@@ -448,3 +448,80 @@ def test_a_voxels_verdict_is_that_of_its_views_one_after_the_other(
             assert last or states[index, 2] == first
     assert {kernels.CARVED, kernels.KEPT} <= set(verdicts.tolist())
     assert last or kernels.SPLIT in verdicts
+
+
+def test_a_first_look_says_who_sees_a_voxel_and_how_many_samples_it_takes() -> None:
+    rng, corner, edge = np.random.default_rng(6), np.array([-2400.0, -2400.0, -1500.0]), 150.0
+    nodes = np.unique(rng.integers(0, 32, (400, 3)), axis=0).astype(np.int32)
+    states, samples = np.zeros((len(nodes), 3), np.uint32), np.zeros(len(nodes), np.int64)
+    first_look(nodes, corner, edge, TABLE, 1.5, states, samples)
+    for node, state, most in zip(nodes, states, samples, strict=True):
+        blind, whole, expected = 0, 0, 0
+        for view, camera in enumerate(VIEWS):
+            place = place_of(view, 75.0, corner + (node + 0.5) * edge)[:, 0]
+            if not place[projection.SEEN]:
+                blind |= 1 << view
+                continue
+            expected = max(expected, math.ceil(1.5 * math.sqrt(place[projection.AREA]) - 1e-9))
+            middle = place[[projection.U, projection.V]]
+            reach = place[[projection.BOUND_X, projection.BOUND_Y]]
+            size = np.array([camera.width, camera.height])
+            if (middle + reach < -0.5).any() or (middle - reach > size - 0.5).any():
+                blind |= 1 << view
+            elif (middle - reach >= 0.0).all() and (middle + reach <= size - 1.0).all():
+                whole = view
+        assert state.tolist() == [0, blind, whole]
+        assert most == expected
+    assert len(np.unique(states[:, 1])) > 5
+    assert len(np.unique(states[:, 2])) == 3
+
+
+@pytest.mark.parametrize("by_pixels", [False, True])
+def test_a_voxels_colour_is_that_of_its_samples_before_the_background(by_pixels: bool) -> None:
+    seen, masks = scene_of_masks(4)
+    inside = np.concatenate([mask.ravel() for mask in masks]) > 0
+    rule = rules()
+    differs = seen.distances > np.float32(rule.single) if by_pixels else inside
+    seen = seen._replace(by_pixels=by_pixels)
+    centres, edges = places(7, 120), np.repeat([20.0, 60.0, 150.0], [70, 1, 49])
+    views, means = np.full((120, 3, 3), -1.0, np.float32), np.full((120, 3), -1.0, np.float32)
+    colour(20, 115, centres, edges, seen, rule, views, means)
+    assert (views[:20] == -1.0).all()
+    assert (means[115:] == -1.0).all()
+    unseen = 0
+    for index in range(20, 115):
+        everything, of_views = [], []
+        for view, camera in enumerate(VIEWS):
+            rows = place_of(view, 0.5 * edges[index], centres[index])
+            most = projection.count_samples(rows.reshape(-1), projection.LANES, 1.0)
+            pixels = np.empty((most, projection.LANES))
+            size = float(camera.width), float(camera.height)
+            projection.sample_pixels(rows.reshape(-1), most, *size, HEIGHTS, pixels.reshape(-1))
+            count = int(rows[projection.COUNT, 0]) if rows[projection.SEEN, 0] else 0
+            at = [BEGINS[0, view] + int(pixel) for pixel in pixels[:count, 0] if pixel >= 0]
+            everything += at
+            shown = [pixel for pixel in at if differs[pixel]]
+            if shown:
+                of_views.append(seen.picture[shown].mean(axis=0))
+                np.testing.assert_allclose(views[index, view], of_views[-1], rtol=1e-5)
+            else:
+                assert np.isnan(views[index, view]).all()
+        if of_views:
+            np.testing.assert_allclose(means[index], np.mean(of_views, axis=0), rtol=1e-5)
+        elif everything:
+            np.testing.assert_allclose(means[index], seen.picture[everything].mean(axis=0), rtol=1e-5)
+            unseen += 1
+        else:
+            assert np.isnan(means[index]).all()
+    assert 5 < unseen < 90
+
+
+def test_voxels_of_one_edge_are_set_together_up_to_sixteen() -> None:
+    centres, edges = np.arange(90.0).reshape(30, 3), np.repeat([2.0, 3.0, 2.0], [20, 4, 6])
+    for first, end, count in ((0, 30, 16), (16, 30, 4), (20, 30, 4), (20, 22, 2), (24, 30, 6), (29, 30, 1)):
+        rows = np.zeros((projection.ROWS, projection.LANES))
+        assert projection.set_centres(rows.reshape(-1), centres, edges, first, end) == count
+        set_rows = rows[projection.CENTRE : projection.CENTRE + 3, :count].T
+        np.testing.assert_array_equal(set_rows, centres[first : first + count])
+        assert not rows[:, count:].any()
+        assert not np.delete(rows, range(projection.CENTRE, projection.CENTRE + 3), axis=0).any()
