@@ -41,13 +41,20 @@ class LandmarkClick:
 
 def clicks_of_file(session: Session, path: Path) -> tuple[LandmarkClick, ...]:
     """The clicks of a file. Raises FootageError for one that cannot be read or does not fit the session."""
-    return _read(session, path)
+    clicks = _read(path)
+    _check(session, clicks, f"'{path.name}': ")
+    return clicks
 
 
 def stored_clicks(session: Session) -> tuple[LandmarkClick, ...]:
-    """The clicks that the session keeps, none where there is no file. Raises FootageError."""
+    """The clicks that the session keeps, without those that its footage has no camera, frame or place for any more
+    since it was changed; none where there is no file. Raises FootageError.
+    """
     path = session.path / LANDMARKS_NAME
-    return _read(session, path) if path.exists() else ()
+    if not path.exists():
+        return ()
+    sources, count = _sources(session), session.manifest.frame_count
+    return tuple(one for one in _read(path) if not _misfit(one, sources, count))
 
 
 def keep_clicks(session: Session, clicks: Sequence[LandmarkClick]) -> None:
@@ -62,7 +69,7 @@ def keep_clicks(session: Session, clicks: Sequence[LandmarkClick]) -> None:
         write_text(path, as_csv([COLUMNS, *rows]))
 
 
-def _read(session: Session, path: Path) -> tuple[LandmarkClick, ...]:
+def _read(path: Path) -> tuple[LandmarkClick, ...]:
     with foreign_file(path, FootageError, "a CSV file of clicked landmarks", FORMAT):
         lines = read_foreign_text(path, wrong=FootageError).splitlines()
     first = next((line for line in lines if line.strip()), "")
@@ -71,9 +78,8 @@ def _read(session: Session, path: Path) -> tuple[LandmarkClick, ...]:
     missing = [name for name in COLUMNS if name not in [head.strip() for head in rows.fieldnames or ()]]
     if missing:
         raise FootageError(f"'{path.name}' has no column '{missing[0]}'.", FORMAT)
-    clicks = tuple(_click(path, row) for row in ({str(k).strip(): v for k, v in one.items()} for one in rows))
-    _check(session, clicks, f"'{path.name}': ")
-    return clicks
+    named = ({str(head).strip(): value for head, value in row.items()} for row in rows)
+    return tuple(_click(path, row) for row in named)
 
 
 def _click(path: Path, row: Mapping[str, str | None]) -> LandmarkClick:
@@ -88,11 +94,11 @@ def _click(path: Path, row: Mapping[str, str | None]) -> LandmarkClick:
 def _check(session: Session, clicks: Sequence[LandmarkClick], where: str) -> None:
     if len(clicks) > MOST_CLICKS:
         raise FootageError(f"{where}{len(clicks)} clicks are too many.", f"Give {MOST_CLICKS} at most.")
-    sources = {source.name: source for source in session.manifest.footage.cameras}
+    sources, count = _sources(session), session.manifest.frame_count
     places = set[tuple[int, str, str]]()
     for click in clicks:
         place = (click.frame, click.camera, click.landmark)
-        if wrong := _misfit(click, sources, session.manifest.frame_count):
+        if wrong := _misfit(click, sources, count):
             raise FootageError(f"{where}{wrong}." if where else sentence(f"{wrong}."), FORMAT)
         if place in places:
             raise FootageError(
@@ -100,6 +106,10 @@ def _check(session: Session, clicks: Sequence[LandmarkClick], where: str) -> Non
                 "Keep one click of a landmark in a view.",
             )
         places.add(place)
+
+
+def _sources(session: Session) -> dict[str, CameraSource]:
+    return {source.name: source for source in session.manifest.footage.cameras}
 
 
 def _misfit(click: LandmarkClick, sources: Mapping[str, CameraSource], count: int) -> str:

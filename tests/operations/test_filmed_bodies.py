@@ -11,7 +11,7 @@ from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.foundations.csv_text import as_csv
 from studio.foundations.errors import BodyError, FootageError
-from studio.sessions.landmark_clicks import COLUMNS, LANDMARKS_NAME, keep_clicks
+from studio.sessions.landmark_clicks import COLUMNS, LANDMARKS_NAME, keep_clicks, stored_clicks
 from studio.sessions.session import Session
 
 BODY = with_dimensions(load_body("planar_arm4"), {"link_2_length": 400.0})
@@ -63,6 +63,9 @@ def test_clicks_that_the_session_keeps_are_taken_where_no_file_is_given(session:
     made = studio.body_from_film("arm")
     assert made.file is None
     assert made.body.dimensions["link_2_length"] == pytest.approx(400, rel=0.02)
+    path = session.path / LANDMARKS_NAME
+    path.write_text(f"{path.read_text()}99,cam1,Tip,5,5\n0,gone,Tip,5,5\n")
+    assert len(stored_clicks(session)) == 4 * 3 * 5  # without those for which there is no footage any more
     keep_clicks(session, [])
     assert not (session.path / LANDMARKS_NAME).exists()
 

@@ -99,7 +99,7 @@ def test_limits_are_widened_where_a_pose_exceeds_them(arm: Session) -> None:
 
 
 def test_limits_are_narrowed_by_many_frames_and_only_where_the_clicks_tell_the_angle(tmp_path: Path) -> None:
-    poses = 0.3 * varied_poses(TRUE_ARM, 22)
+    poses = 0.6 * varied_poses(TRUE_ARM, 22)
     session = write_session(tmp_path / "arm", TRUE_ARM, poses, AROUND_ARM, masks=False)
     clicks = clicks_on(TRUE_ARM, JOINTS[:-1], poses, AROUND_ARM)
     few = body_of_film(session, ARM, clicks, FilmRequest(radii=False))
@@ -109,6 +109,9 @@ def test_limits_are_narrowed_by_many_frames_and_only_where_the_clicks_tell_the_a
         assert -60.0 < limits[name][0] < seen[:, at].min() - 10.0
         assert seen[:, at].max() + 10.0 < limits[name][1] < 60.0
         assert limits[name][1] - limits[name][0] >= 59.0
+    still = write_session(tmp_path / "still", TRUE_ARM, 0.2 * poses, AROUND_ARM, masks=False)
+    seldom = body_of_film(still, ARM, clicks_on(TRUE_ARM, JOINTS[:-1], 0.2 * poses, AROUND_ARM)).body
+    assert np.degrees(seldom.upper).round().tolist() == [60.0] * 4  # it never bent: nothing is known
     # The last link's angle shows at its tip alone.
     assert limits["x4"].tolist() == [-60.0, 60.0]
     kept = body_of_film(session, ARM, clicks, FilmRequest(radii=False, limits=False)).body

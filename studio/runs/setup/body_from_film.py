@@ -37,8 +37,8 @@ from studio.sessions.session import Session
 
 FEWEST_FRAMES, FEWEST_LANDMARKS = 2, 3
 MOST_FRAMES = 60
-FRAMES_FOR_LIMITS = 20
-"""Frames from which limits are also narrowed."""
+FRAMES_FOR_LIMITS, MOVED = 20, 30.0
+"""Frames, and degrees through which an angle moved in them, from which its limits are also narrowed."""
 LIMIT_MARGIN, LIMIT_SHARE, NARROWEST = 15.0, 0.5, 60.0
 """Degrees beyond the angles seen, and as a share of their range; the narrowest range that is set."""
 AT_A_LIMIT = 1.0
@@ -410,8 +410,8 @@ def _masks(session: Session, frames: Sequence[int]) -> list[dict[str, Bytes]]:
 
 
 def _limits(template: BodyModel, turns: Mask, poses: Array, notes: list[str]) -> dict[str, float]:
-    """Limits of bounded angles below the root, degrees, by the poses seen: widened, and narrowed where many frames were
-    seen; a pair's angles alike. turns : (D,) which parameters the clicks told.
+    """Limits of bounded angles below the root, degrees, by the poses seen: widened, and narrowed where an angle moved
+    in many frames; a pair's angles alike. turns : (D,) which parameters the clicks told.
     """
     root = root_joint(template)
     of_root = template.joints[root].parameters if root >= 0 else ()
@@ -423,13 +423,13 @@ def _limits(template: BodyModel, turns: Mask, poses: Array, notes: list[str]) ->
         ends = np.stack([np.minimum(ends[0], other[0]), np.maximum(ends[1], other[1])])
     lows: list[float] = (ends[0] + rest).tolist()
     highs: list[float] = (ends[1] + rest).tolist()
-    narrow = len(poses) >= FRAMES_FOR_LIMITS
     limits, widened, narrowed = dict[str, float](), list[str](), 0
     for at, (entry, low, high) in enumerate(zip(template.parameters, lows, highs, strict=True)):
         bounded = math.isfinite(entry.lower) and math.isfinite(entry.upper)
         if entry.kind != "angle" or at in of_root or not bounded or not turns[at]:
             continue
         before = math.degrees(entry.lower), math.degrees(entry.upper)
+        narrow = len(poses) >= FRAMES_FOR_LIMITS and high - low >= MOVED
         margin = max(LIMIT_MARGIN, LIMIT_SHARE * (high - low), 0.5 * (NARROWEST - (high - low)))
         lower, upper = low - margin, high + margin
         below, above = low < before[0] - AT_A_LIMIT, high > before[1] + AT_A_LIMIT
@@ -447,7 +447,7 @@ def _limits(template: BodyModel, turns: Mask, poses: Array, notes: list[str]) ->
         notes.append(
             f"The limits of {counted(narrowed, 'angle')} were narrowed to what was seen, with a margin."
         )
-    elif not narrow:
+    elif len(poses) < FRAMES_FOR_LIMITS:
         notes.append(f"Limits were not narrowed: {len(poses)} frames do not show how far the joints go.")
     return limits
 
