@@ -210,7 +210,7 @@ def _prepare_spec(spec: Any, path: Path, notes: list[str]) -> None:  # noqa: ANN
     compiler = spec.compiler
     compiler.fusestatic, compiler.discardvisual = False, False
     compiler.boundmass, compiler.boundinertia, compiler.balanceinertia = 1e-3, 1e-6, True
-    folder = path.parent / spec.meshdir if hasattr(spec, "meshdir") else path.parent / compiler.meshdir
+    folder = path.parent / spec.meshdir
     absent: set[str] = set()
     for mesh in list(spec.meshes):
         mesh.inertia = convex
@@ -256,8 +256,8 @@ class _Part:
 class _Drive:
     """What moves a joint: a parameter with its sign, or nothing, and a fixed share before it (degrees or mm)."""
 
-    parameter: str = ""
-    before: float = 0.0
+    parameter: str
+    before: float
 
 
 @dataclass(slots=True)
@@ -396,11 +396,7 @@ class _Robot:
         axis = np.asarray(model.jnt_axis[joint], dtype=float)
         drive = self._mimicked(joint, word, unit)
         if drive is None:
-            lower, upper = -math.inf, math.inf
-            if model.jnt_limited[joint]:
-                lower, upper = (
-                    _rounded(unit * float(value), ROUND_DEGREES) for value in model.jnt_range[joint]
-                )
+            lower, upper = self._limits(joint, unit)
             if lower >= upper:
                 drive = _Drive("", unit * (float(rest[at]) - float(model.qpos0[at])))
                 self.notes.append(f"joint '{name}' has no room between its limits and is fixed")
@@ -426,7 +422,7 @@ class _Robot:
             if other < 0:
                 return _Drive("", unit * float(shares[0]))
             same = model.jnt_type[joint] == model.jnt_type[other]
-            if same and self._leads(other) and abs(shares[1]) == 1.0 and not np.any(shares[2:]):
+            if same and self._leads(other, unit) and abs(shares[1]) == 1.0 and not np.any(shares[2:]):
                 sign = float(shares[1])
                 start = float(model.qpos0[model.jnt_qposadr[other]])
                 before = unit * (float(shares[0]) - sign * start)
@@ -437,12 +433,18 @@ class _Robot:
             )
         return None
 
-    def _leads(self, joint: int) -> bool:
+    def _limits(self, joint: int, unit: float) -> tuple[float, float]:
+        if not self.model.jnt_limited[joint]:
+            return -math.inf, math.inf
+        lower, upper = (_rounded(unit * float(value), ROUND_DEGREES) for value in self.model.jnt_range[joint])
+        return lower, upper
+
+    def _leads(self, joint: int, unit: float) -> bool:
         """Whether a hinge or slide has a parameter of its own."""
         model = self.model
         follows = (model.eq_type == 2) & (model.eq_obj1id == joint) & (model.eq_active0 != 0)
-        lower, upper = model.jnt_range[joint]
-        return not follows.any() and not (model.jnt_limited[joint] and lower >= upper)
+        lower, upper = self._limits(joint, unit)
+        return not follows.any() and lower < upper
 
     def _driver(self, joint: int) -> str:
         """The name of the parameter of a hinge or slide."""

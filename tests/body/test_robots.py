@@ -100,7 +100,7 @@ CRANE = """<mujoco model="2 cranes!">
           <joint name="reach" type="slide" axis="0 0 1" range="0.1 1.5" ref="0.25"/>
           <geom name="g3" type="ellipsoid" size="0.05 0.3 0.02" pos="0 0.3 0"/>
           <body name="Right-claw" pos="0 0.6 0">
-            <joint name="claw" type="slide" axis="1 0 0" range="0 0.1"/>
+            <joint name="claw" type="slide" axis="1 0 0" range="0 0.1" ref="0.03"/>
             <geom name="g4" type="box" size="0.03 0.02 0.1"/>
           </body>
           <body name="Right+claw" pos="0 0.6 0">
@@ -109,7 +109,7 @@ CRANE = """<mujoco model="2 cranes!">
             <geom name="g5" type="box" size="0.03 0.1 0.02"/>
           </body>
           <body name="Right claw" pos="0 0.6 0.1">
-            <joint name="wrist" type="ball" range="0 0.8"/>
+            <joint name="wrist" type="ball" range="0 0.8" pos="0.01 0.02 0.03"/>
             <geom name="g6" type="box" size="0.1 0.02 0.03"/>
             <body name="odd" pos="0.1 0 0">
               <joint name="odd" axis="0 1 0"/>
@@ -366,7 +366,7 @@ def test_every_part_lies_where_its_geometry_does_and_is_as_large(crane: BodyMode
     """Half the length and both radii about their axes as one matrix, beside the geometry's own."""
     model = mujoco.MjModel.from_xml_string(CRANE)
     data = mujoco.MjData(model)
-    data.qpos[[0, 1, 2, 3, 4, 5]] = 0.4, 0.3, 0.9, 0.05, 0.02 + 0.01 - 0.05, 0.3 + 0.2
+    data.qpos[[0, 1, 2, 3, 4, 5]] = 0.4, 0.3, 0.9, 0.05, 0.02 + 0.01 - (0.05 - 0.03), 0.3 + 0.2
     mujoco.mj_kinematics(model, data)
     pose = np.array([0.4, 0.3, 900.0, 50.0, *np.zeros(6)])
     box, ball = 2.0 / np.sqrt(np.pi), np.sqrt(2.0 / 3.0)
@@ -414,6 +414,69 @@ def test_what_was_changed_of_a_file_is_said(crane: BodyModel) -> None:
         "a part of 'base' that no cone can be was left out; "
         "links without geometry (mast, odd) have a radius of 0.12 of their length."
     )
+
+
+FOLLOWERS = """<mujoco><worldbody>
+<body name="a"><joint name="one" type="slide" axis="1 0 0"/><geom type="sphere" size="1"/>
+  <body name="b"><joint name="two" type="slide" axis="1 0 0"/><geom type="sphere" size="1"/>
+    <body name="c">
+      <joint name="three" type="slide" axis="1 0 0"/><joint name="four"/><joint name="five" axis="0 1 0"/>
+      <geom type="sphere" size="1"/>
+      <body name="d">
+        <joint name="six" axis="0 0 1" range="10 10.00000000001" ref="2"/><joint name="seven" axis="0 1 0"/>
+        <geom type="sphere" size="1"/>
+      </body>
+    </body>
+  </body>
+</body></worldbody>
+<equality>
+  <joint joint1="two" joint2="one" polycoef="0 1 0 0 0"/><joint joint1="three" joint2="two" polycoef="0 1 0 0 0"/>
+  <joint joint1="four" joint2="one" polycoef="0 1 0 0 0"/><joint joint1="five" joint2="four" polycoef="0 -1 0 0 0.1"/>
+  <joint joint1="seven" joint2="six" polycoef="0 1 0 0 0"/>
+</equality>
+<keyframe><key qpos="0 0 0 0 0 0.2 0"/></keyframe></mujoco>"""
+
+
+def test_what_follows_a_follower_another_kind_or_what_cannot_move_moves_by_itself(tmp_path: Path) -> None:
+    body = load_body(str(written(tmp_path, "followers.xml", FOLLOWERS)))
+    assert [entry.name for entry in body.parameters] == ["one", "three", "four", "five", "seven"]
+    for name, other in (("three", "two"), ("four", "one"), ("five", "four"), ("seven", "six")):
+        assert f"'{name}' follows '{other}' in the file and moves by itself here" in body.definition.source
+    assert "'six' has no room between its limits and is fixed" in body.definition.source
+    fixed = next(joint for joint in body.definition.joints if joint.name == "d six")
+    assert (fixed.type, [(step.turn, step.by) for step in fixed.sequence]) == (
+        "fixed",
+        [("z", pytest.approx(np.degrees(0.2) - 2.0))],
+    )
+
+
+BLOCK = [(x, y, z) for x in (0, 100) for y in (0, 100) for z in (0, 400)]
+FACES = ["1 3 7 5", "2 6 8 4", "1 5 6 2", "3 4 8 7", "1 2 4 3", "5 7 8 6"]
+
+
+def test_of_an_mjcfs_meshes_those_that_are_there_are_read(tmp_path: Path) -> None:
+    """Beside a mass that MuJoCo would refuse."""
+    (tmp_path / "parts").mkdir()
+    lines = [f"v {x} {y} {z}" for x, y, z in BLOCK] + [f"f {face}" for face in FACES]
+    (tmp_path / "parts" / "block.obj").write_text("\n".join(lines))
+    (tmp_path / "parts" / "shape.dae").write_text("of another kind")
+    text = """<mujoco><compiler meshdir="parts"/><asset><mesh name="whole" file="block.obj" scale="0.001 0.001 0.001"/>
+        <mesh file="lost.stl"/><mesh name="odd" file="shape.dae"/></asset><worldbody><body name="a">
+        <joint name="j"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 9"/><geom type="mesh" mesh="whole"/>
+        <geom type="mesh" mesh="lost"/><geom type="mesh" mesh="odd"/></body></worldbody></mujoco>"""
+    body = load_body(str(written(tmp_path, "parts.xml", text)))
+    assert [limb.length for limb in body.limbs] == pytest.approx([400.0])
+    assert "Mesh 'lost.stl' was left out; mesh 'shape.dae' was left out." in body.definition.source
+
+
+@pytest.mark.parametrize("word", ["fast", "inf", "-1", "0"])
+def test_without_a_velocity_the_usual_one_counts(tmp_path: Path, word: str) -> None:
+    text = GRIPPER.replace('velocity="0.25"', f'velocity="{word}"').replace("continuous", "revolute")
+    text = text.replace(
+        '<axis xyz="1 -2 2"/>', '<axis xyz="1 -2 2"/><limit lower="-1" upper="1" velocity="2"/>'
+    )
+    rise, turn = load_body(str(written(tmp_path, "slow.urdf", text))).parameters
+    assert (rise.max_step, turn.max_step) == (500.0, pytest.approx(2.0, rel=1e-4))
 
 
 def test_of_things_that_lie_about_the_first_is_the_body(tmp_path: Path) -> None:
@@ -529,14 +592,14 @@ def test_what_is_flat_has_no_cone(points: np.ndarray) -> None:
 
 
 def test_a_mesh_beside_the_file_is_found(tmp_path: Path) -> None:
+    """Whatever the file itself would have MuJoCo do."""
     (tmp_path / "robot" / "meshes").mkdir(parents=True)
     (tmp_path / "robot" / "urdf").mkdir()
-    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 4)]
-    faces = ["1 3 7 5", "2 6 8 4", "1 5 6 2", "3 4 8 7", "1 2 4 3", "5 7 8 6"]
-    lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {face}" for face in faces]
+    lines = [f"v {x} {y} {z}" for x, y, z in BLOCK] + [f"f {face}" for face in FACES]
     (tmp_path / "robot" / "meshes" / "part.obj").write_text("\n".join(lines))
-    mesh = '<mesh filename="package://robot/meshes/part.obj" scale="0.1 0.1 0.1"/>'
+    mesh = '<mesh filename="package://robot/meshes/part.obj" scale="0.001 0.001 0.001"/>'
     text = GRIPPER.replace('<sphere radius="0.02"/>', mesh)
+    text = text.replace('name="gripper">', 'name="gripper"><mujoco><compiler strippath="true"/></mujoco>')
     body = load_body(str(written(tmp_path / "robot" / "urdf", "gripper.urdf", text)))
     limb = next(limb for limb in body.limbs if limb.name == "right_finger")
     mesh = next(one for one in body.meshes if body.joints[one.joint].name == "right_finger")
