@@ -13,6 +13,7 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import joint_frames, limb_ends, marker_points
 from studio.body.model import BodyModel
+from studio.body.reader import parse_body
 
 HALF_TURN = math.pi
 # A pose of the walk's kind, degrees, by parameter; the others are neutral.
@@ -79,6 +80,75 @@ def test_every_branch_of_a_stride_comes_back_within_the_limits(
     np.testing.assert_allclose(limb_ends(body, rewritten), limb_ends(body, pose), atol=1e-9)
     found = within_limits(body, rewritten)
     np.testing.assert_allclose(found, pose, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize(("over", "turned"), [(True, False), (False, True), (True, True)])
+@pytest.mark.parametrize(("ball", "hinge"), [*CHAINS, ("all", "")])
+def test_one_joint_or_all_written_otherwise_come_back(
+    ball: str, hinge: str, over: bool, turned: bool
+) -> None:
+    """With whole turns beside it."""
+    body = load_body("human31")
+    pose = _stride(body)
+    rewritten = pose.copy()
+    for one, bend in CHAINS if ball == "all" else [(ball, hinge)]:
+        rewritten = _on_branch(body, rewritten, one, bend, over, turned)
+        rewritten[_places(body, bend)] -= 4.0 * HALF_TURN
+        rewritten[_places(body, f"{one}_rx")] += 2.0 * HALF_TURN
+    np.testing.assert_allclose(within_limits(body, rewritten), pose, rtol=0.0, atol=1e-11)
+
+
+def test_lengths_and_angles_without_limits_are_not_wound() -> None:
+    body = load_body("human31")
+    pose = _stride(body)
+    free = ~body.bounded_angles
+    pose[free] += 4.0 * HALF_TURN
+    np.testing.assert_array_equal(within_limits(body, pose), pose)
+
+
+SWING = """
+title = "A ball with a rod on a hinge"
+parameters = [
+    { name = "a", kind = "angle", limb = "x", max_step = 1, lower = -80, upper = 80 },
+    { name = "b", kind = "angle", limb = "x", max_step = 1, lower = -80, upper = 80 },
+    { name = "c", kind = "angle", limb = "x", max_step = 1, lower = -80, upper = 80 },
+    { name = "d", kind = "angle", limb = "x", max_step = 1, lower = 0, upper = 140 },
+]
+joints = [
+    { name = "stand", parent = "world", type = "fixed", sequence = [{ move = "x", by = 7 }] },
+    { name = "ball", parent = "stand", type = "ball", sequence = [
+        { move = "z", by = 5 }, { turn = "x", by = "a" }, { turn = "y", by = "b" }, { turn = "z", by = "c" },
+    ] },
+    { name = "aside", parent = "ball", type = "fixed", sequence = [{ move = "z", by = -90 }] },
+    { name = "rod", parent = "ball", type = "hinge", sequence = [{ move = "z", by = -80 }, { turn = "y", by = "d" }] },
+]
+limbs = [{ name = "upper", joint = "ball", length = -80, radius_start = 9, radius_end = 9 },
+         { name = "rod", joint = "rod", length = -60, radius_start = 9, radius_end = 9 }]
+"""
+
+
+@pytest.mark.parametrize(("over", "turned"), [(True, False), (False, True), (True, True)])
+def test_a_joint_is_rewritten_with_the_hinge_that_hangs_on_it(over: bool, turned: bool) -> None:
+    body = parse_body(SWING, "swing", "swing.toml")
+    pose = np.array([0.3, -0.4, 0.5, 0.6])
+    other = pose.copy()
+    if over:
+        other[:3] = pose[0] + HALF_TURN, HALF_TURN - pose[1], pose[2] + HALF_TURN
+    if turned:
+        other[2:] = other[2] + HALF_TURN, -pose[3]
+    np.testing.assert_allclose(within_limits(body, other), pose, atol=1e-11)
+    # A flat rod shows which way it was turned about itself, but half a turn.
+    flat = SWING.replace("radius_end = 9 }]", "radius_end = 9, scale_x = 0.5 }]")
+    np.testing.assert_allclose(within_limits(parse_body(flat, "f", "f.toml"), other), pose, atol=1e-11)
+
+
+def test_two_angles_about_one_axis_are_no_ball() -> None:
+    """Whatever is done, the same frames come out."""
+    text = SWING.replace('turn = "z", by = "c"', 'turn = "x", by = "c"')
+    body = parse_body(text, "swing", "swing.toml")
+    pose = np.array([0.3 + HALF_TURN, HALF_TURN + 0.4, 0.5 + HALF_TURN, 0.6])
+    found = within_limits(body, pose)
+    np.testing.assert_allclose(joint_frames(body, found), joint_frames(body, pose), atol=1e-9)
 
 
 def test_a_ball_joints_other_angles_are_the_same_rotation() -> None:

@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from studio.body.catalogue import list_bodies, load_body
-from studio.body.dragging import REACHED, Dragger
+from studio.body.dragging import REACHED, Dragger, root_joint
 from studio.body.forward_kinematics import limb_ends, marker_points
+from studio.body.model import extremities
+from studio.body.reader import parse_body
 from studio.foundations.errors import BodyError
 from studio.foundations.geometry.rotations import rotation_from_vector
 
@@ -111,6 +114,142 @@ def test_the_root_moves_to_its_frame(name: str) -> None:
     np.testing.assert_allclose(after, goal, atol=1e-3)
     assert np.array_equal(found[6:], body.neutral[6:])
     assert Dragger(load_body("planar_arm4")).root_frame(np.zeros(4)) is None
+
+
+def test_an_arms_pose_is_the_nearest_that_reaches_its_outer_joints_first() -> None:
+    """Against scipy's own least squares of the stated sum: 0.3 mm a radian at the wrist, 3 at the shoulder."""
+    body = load_body("planar_arm4")
+    dragger = Dragger(body)
+    start = np.array([0.2, 0.3, -0.2, 0.4])
+    pulls = np.array([3.0, 2.1, 1.2, 0.3])
+    for name, moved in (("link 4", 4), ("link 2", 2)):
+        limb = dragger.grip(name).limb
+        goal = dragger.points(start + np.array([0.3, -0.2, 0.25, -0.4]))[limb]
+        pull = pulls if moved == 4 else np.array([3.0, 0.3])
+
+        def residuals(values: np.ndarray, limb=limb, goal=goal, moved=moved, pull=pull) -> np.ndarray:
+            pose = np.concatenate([values, start[moved:]])
+            return np.concatenate([dragger.points(pose)[limb] - goal, pull * (values - start[:moved])])
+
+        wanted = least_squares(residuals, start[:moved], xtol=1e-12, ftol=1e-12, gtol=1e-12).x
+        found = dragger.dragged(start, name, goal)
+        np.testing.assert_allclose(found.pose[:moved], wanted, atol=2e-4)
+        np.testing.assert_array_equal(found.pose[moved:], start[moved:])
+        assert found.left_mm == pytest.approx(np.linalg.norm(dragger.points(found.pose)[limb] - goal))
+
+
+def test_the_whole_body_follows_as_little_as_its_ends_its_joints_and_its_root_are_held() -> None:
+    """Other ends count a fifth, joints 3 mm a radian, the root 20 mm a radian or 400 mm."""
+    body = load_body("human25")
+    dragger = Dragger(body)
+    start = np.clip(body.neutral + 0.05, body.lower, body.upper)
+    grip = dragger.grip("right forearm")
+    goal = dragger.points(start)[grip.limb] + [200.0, 100.0, 100.0]
+    root = np.arange(6)
+    pull = np.where(np.isin(np.arange(len(start)), root), 20.0, 3.0)
+    np.testing.assert_array_equal(dragger._whole_pull(), pull)
+    scale = np.where(body.angles, 1.0, 400.0)
+    held = [at for at in extremities(body) if at != grip.limb]
+
+    def residuals(values: np.ndarray) -> np.ndarray:
+        away = dragger.points(values * scale) - dragger.points(start)
+        reached = dragger.points(values * scale)[grip.limb] - goal
+        return np.concatenate([reached, 0.2 * away[held].ravel(), pull * (values - start / scale)])
+
+    everything = np.arange(len(start))
+    found = dragger._fit(start, start, everything, pull, grip, goal, extremities(body))
+    limits = (body.lower / scale - 1e-9, body.upper / scale + 1e-9)
+    wanted = least_squares(residuals, start / scale, bounds=limits, xtol=1e-7)
+    assert 0.5 * (residuals(found / scale) ** 2).sum() == pytest.approx(wanted.cost, rel=1e-4)
+
+
+def test_what_the_chain_moves_starts_at_the_root_and_leaves_it_out() -> None:
+    body = load_body("human31")
+    dragger = Dragger(body)
+    names = [entry.name for entry in body.parameters]
+    chain = [names[at] for at in dragger._chains[dragger.grip("left shin").limb]]
+    assert sorted(chain) == ["left_hip_rx", "left_hip_ry", "left_hip_rz", "left_knee_ry"]
+    assert chain[-1] == "left_knee_ry"
+    trunk = next(grip for grip in dragger.grips if grip.root)
+    assert not len(dragger._chains[trunk.limb])
+    assert [grip.name for grip in dragger.grips] == [limb.name for limb in body.drawn]
+    assert [grip.limb for grip in dragger.grips] == list(range(len(body.drawn)))
+    assert [grip.side for grip in dragger.grips] == [limb.side for limb in body.drawn]
+
+
+def test_a_limb_that_the_root_alone_moves_takes_the_body_along() -> None:
+    body = load_body("human31")
+    dragger = Dragger(body)
+    trunk = next(grip for grip in dragger.grips if grip.root)
+    goal = dragger.points(body.neutral)[trunk.limb] + [30.0, 40.0, 0.0]
+    found = dragger.dragged(body.neutral, trunk.name, goal)
+    assert found.left_mm < 2.0
+    assert np.abs(found.pose[:6] - body.neutral[:6]).max() > 10.0
+
+
+def test_a_stretched_chain_is_bent_part_of_the_way_to_the_middle_of_its_limits() -> None:
+    body = load_body("human31")
+    dragger = Dragger(body)
+    start = np.clip(body.neutral + 0.1, body.lower, body.upper)
+    grip = dragger.grip("left forearm")
+    chain = dragger._chains[grip.limb]
+    bent = dragger._bend(start, grip)
+    bounded = [at for at in chain if np.isfinite(body.lower[at]) and np.isfinite(body.upper[at])]
+    wanted = start.copy()
+    for at in bounded:
+        wanted[at] = 0.6 * start[at] + 0.4 * (body.lower[at] + body.upper[at]) / 2.0
+    np.testing.assert_allclose(bent, wanted)
+    assert bounded
+
+
+CART = """
+title = "A cart on rails"
+parameters = [
+    {{ name = "a", kind = "{kind}", limb = "x", max_step = 1{limits} }},
+    {{ name = "b", kind = "angle", limb = "x", max_step = 1 }},
+]
+joints = [
+    {{ name = "stand", parent = "world", type = "fixed" }},
+    {{ name = "cart", parent = "stand", type = "{joint}", sequence = [{{ {word} = "x", by = "a" }}] }},
+    {{ name = "arm", parent = "cart", type = "hinge", sequence = [{{ turn = "y", by = "b" }}] }},
+]
+limbs = [{{ name = "arm", joint = "arm", length = 100, radius_start = 1, radius_end = 1 }}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "limits", "root"),
+    [
+        ("length", "", 1),
+        ("length", ", upper = 9", 1),
+        ("length", ", lower = -9, upper = 9", -1),
+        ("angle", "", -1),
+    ],
+)
+def test_the_root_is_the_first_joint_that_moves_if_it_goes_anywhere(
+    kind: str, limits: str, root: int
+) -> None:
+    joint, word = ("slide", "move") if kind == "length" else ("hinge", "turn")
+    body = parse_body(CART.format(kind=kind, limits=limits, joint=joint, word=word), "cart", "cart.toml")
+    assert root_joint(body) == root
+    found = Dragger(body).dragged(np.zeros(2), "arm", np.array([5.0, 0.0, 99.0]))
+    assert found.left_mm < 5.0
+
+
+@pytest.mark.parametrize(
+    ("pose", "target"),
+    [(np.zeros((1, 4)), np.zeros(3)), (np.zeros(4), np.zeros(2)), (np.full(4, np.inf), np.zeros(3)),
+     (np.zeros(4), np.array([0.0, 0.0, 2e7]))],
+)  # fmt: skip
+def test_what_is_no_pose_or_no_place_is_refused(pose: np.ndarray, target: np.ndarray) -> None:
+    with pytest.raises(BodyError, match="4 numbers and a place"):
+        Dragger(load_body("planar_arm4")).dragged(pose, "link 1", target)
+
+
+def test_a_pose_beyond_its_limits_is_dragged_from_within() -> None:
+    body = load_body("human29")
+    found = Dragger(body).dragged(body.neutral + 0.5, "left forearm", np.array([200.0, 300.0, 1000.0]))
+    assert within(body, found.pose)
 
 
 def test_wrong_input_is_refused() -> None:
