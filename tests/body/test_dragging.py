@@ -202,6 +202,16 @@ def test_a_stretched_chain_is_bent_part_of_the_way_to_the_middle_of_its_limits()
     assert bounded
 
 
+def test_a_chain_with_a_limit_on_one_side_alone_is_not_bent_to_its_middle() -> None:
+    text = CART.format(kind="angle", limits="", joint="hinge", word="turn")
+    body = parse_body(
+        text.replace('limb = "x", max_step = 1 }', 'limb = "x", max_step = 1, lower = -9 }'), "c", "c.toml"
+    )
+    found = Dragger(body).dragged(np.zeros(2), "arm", np.array([0.0, 0.0, 500.0]))
+    assert np.isfinite(found.pose).all()
+    assert found.left_mm == pytest.approx(400.0, abs=1e-3)
+
+
 CART = """
 title = "A cart on rails"
 parameters = [
