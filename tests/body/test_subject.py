@@ -11,7 +11,9 @@ from studio.body.model import BodyModel
 from studio.body.subject import (
     DEFAULT_BODY,
     Subject,
+    enlarged,
     fit_subject,
+    in_lengths,
     read_subject,
     subject_from_shape,
     write_subject,
@@ -161,6 +163,10 @@ def test_a_dog_is_sized_by_its_own_markers() -> None:
 @pytest.mark.parametrize(("subject", "words"), [
     (Subject(height_mm=float("nan")), "height_mm is nan"),
     (Subject(height_mm=-1.0), "height_mm is -1"),
+    (Subject(height_mm=299.0), "height_mm is 299"),
+    (Subject(height_mm=3001.0), "height_mm is 3001"),
+    (Subject(lengths_mm={"RHip_RKnee": 10_001.0}), "'RHip_RKnee' is 10001"),
+    (Subject(dimensions_mm={"left_foot_length": -1.0}), "'left_foot_length' is -1"),
     (Subject(lengths_mm={"RHip_RKnee": float("nan")}), "'RHip_RKnee' is nan"),
     (Subject(lengths_mm={"RHip_RKnee": 0.0}), "'RHip_RKnee' is 0"),
     (Subject(dimensions_mm={"tail_length": 3.0}), "no dimension 'tail_length'"),
@@ -170,6 +176,94 @@ def test_wrong_values_are_refused(human31: BodyModel, subject: Subject, words: s
     with pytest.raises(BodyError, match=words) as caught:
         fit_subject(human31, subject)
     assert caught.value.hint
+
+
+@pytest.mark.parametrize(
+    "subject",
+    [
+        Subject(height_mm=300.0),
+        Subject(height_mm=3000.0),
+        Subject("human31", dimensions_mm={"left_foot_length": 10_000.0}),
+    ],
+)
+def test_the_least_and_the_largest_sizes_are_taken(human31: BodyModel, subject: Subject) -> None:
+    body, _ = fit_subject(human31, subject)
+    if subject.height_mm:
+        assert body.dimensions["left_thigh_length"] == pytest.approx(0.245 * subject.height_mm)
+    else:
+        assert body.dimensions["left_foot_length"] == 10_000.0
+
+
+def test_all_measures_grow_alike_and_ratios_stay() -> None:
+    subject = Subject(
+        "human31", 1700.0, {"RHip_RKnee": 400.0}, {"left_foot_length": 250.0}, {"head_scale_y": 0.9}
+    )
+    larger = enlarged(subject, 0.05)
+    assert (larger.body, larger.ratios) == ("human31", {"head_scale_y": 0.9})
+    assert larger.height_mm == pytest.approx(1785.0)
+    assert [dict(one) for one in (larger.lengths_mm, larger.dimensions_mm)] == [
+        {"RHip_RKnee": pytest.approx(420.0)},
+        {"left_foot_length": pytest.approx(262.5)},
+    ]
+    assert enlarged(Subject(), 0.05) == Subject()
+
+
+def test_a_shapes_numbers_go_to_dimensions_and_ratios_by_their_order(human31: BodyModel) -> None:
+    order = human31.definition.shape_order
+    numbers = np.arange(1.0, len(order) + 1.0)
+    subject = subject_from_shape(human31, numbers[None])
+    ratios = {name for name in order if human31.definition.dimensions[name].ratio is not None}
+    assert {**subject.dimensions_mm, **subject.ratios} == dict(zip(order, numbers.tolist(), strict=True))
+    assert set(subject.ratios) == ratios
+    assert (subject.body, subject.height_mm, dict(subject.lengths_mm)) == ("human31", None, {})
+    with pytest.raises(BodyError, match=r"The shape: .* is -1"):
+        subject_from_shape(human31, -np.ones(len(order)))
+
+
+def test_without_a_height_sides_that_nothing_says_are_levelled(human31: BodyModel) -> None:
+    """One length is shared by both in the ratio of the mean sides; what is given directly stays."""
+    own = {"left_clavicle_length": 150.0}
+    body, _ = fit_subject(human31, Subject("human31", None, {"LHip_RHip": 220.0}, own))
+    assert body.dimensions["left_hip_offset"] == pytest.approx(body.dimensions["right_hip_offset"])
+    assert body.dimensions["left_clavicle_length"] == 150.0
+    unmeasured = {"torso_length", "left_thigh_radius_start", "right_clavicle_length"} & set(body.dimensions)
+    shares = human31.definition.dimensions
+    for name in unmeasured:
+        if shares[name].of_height is None:
+            assert body.dimensions[name] == human31.dimensions[name], name
+
+
+def test_a_fit_changes_what_is_undetermined_alike(human31: BodyModel) -> None:
+    """A distance over two bones of the prior's lengths x and y: both by the same factor."""
+    lengths = {"Hip_RHip": 100.0, "RHip_LHip": 230.0}
+    body, _ = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm=lengths))
+    assert body.dimensions["right_hip_offset"] == pytest.approx(100.0, abs=1e-6)
+    assert body.dimensions["left_hip_offset"] == pytest.approx(130.0, abs=1e-6)
+    far, _ = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm={"RHip_RKnee": 4000.0}))
+    assert far.dimensions["right_thigh_length"] == pytest.approx(4000.0, abs=1e-6)
+    near, _ = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm={"RHip_RKnee": 1.0}))
+    assert near.dimensions["right_thigh_length"] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_standing_length_weighs_three_hundredths_of_one_that_no_pose_changes(human31: BodyModel) -> None:
+    """Two bones of 430 and 420 mm, 900 mm along a leg that stands straight: the least squares of all three."""
+    lengths = {"RHip_RKnee": 430.0, "RKnee_RAnkle": 420.0, "RHip_RAnkle": 900.0}
+    body, _ = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm=lengths))
+    design = np.array([[1.0, 0.0], [0.0, 1.0], [0.03, 0.03]])
+    expected = np.linalg.lstsq(design, np.array([430.0, 420.0, 27.0]))[0]
+    found = [body.dimensions["right_thigh_length"], body.dimensions["right_shin_length"]]
+    np.testing.assert_allclose(found, expected, atol=2e-3)
+
+
+def test_dimensions_of_another_body_become_all_distances_that_no_pose_changes(human31: BodyModel) -> None:
+    subject = Subject("human31", HEIGHT, {"RHip_RKnee": 444.0}, {"left_thigh_length": 410.0})
+    other = in_lengths(subject, human31)
+    assert (other.body, other.height_mm, other.dimensions_mm, other.ratios) == ("human31", HEIGHT, {}, {})
+    assert other.lengths_mm["RHip_RKnee"] == 444.0
+    assert other.lengths_mm["LHip_LKnee"] == pytest.approx(410.0)
+    assert other.lengths_mm["Neck_Head"] == pytest.approx(
+        _distance(fit_subject(human31, subject)[0], "Neck_Head")
+    )
 
 
 def test_a_subject_file_comes_back_as_written(tmp_path: Path) -> None:
