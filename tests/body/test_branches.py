@@ -109,10 +109,10 @@ def test_lengths_and_angles_without_limits_are_not_wound() -> None:
 SWING = """
 title = "A ball with a rod on a hinge"
 parameters = [
+    { name = "d", kind = "angle", limb = "x", max_step = 1, lower = 0, upper = 140 },
     { name = "a", kind = "angle", limb = "x", max_step = 1, lower = -80, upper = 80 },
     { name = "b", kind = "angle", limb = "x", max_step = 1, lower = -80, upper = 80 },
     { name = "c", kind = "angle", limb = "x", max_step = 1, lower = -80, upper = 80 },
-    { name = "d", kind = "angle", limb = "x", max_step = 1, lower = 0, upper = 140 },
 ]
 joints = [
     { name = "stand", parent = "world", type = "fixed", sequence = [{ move = "x", by = 7 }] },
@@ -130,12 +130,12 @@ limbs = [{ name = "upper", joint = "ball", length = -80, radius_start = 9, radiu
 @pytest.mark.parametrize(("over", "turned"), [(True, False), (False, True), (True, True)])
 def test_a_joint_is_rewritten_with_the_hinge_that_hangs_on_it(over: bool, turned: bool) -> None:
     body = parse_body(SWING, "swing", "swing.toml")
-    pose = np.array([0.3, -0.4, 0.5, 0.6])
+    pose = np.array([0.6, 0.3, -0.4, 0.5])
     other = pose.copy()
     if over:
-        other[:3] = pose[0] + HALF_TURN, HALF_TURN - pose[1], pose[2] + HALF_TURN
+        other[1:] = pose[1] + HALF_TURN, HALF_TURN - pose[2], pose[3] + HALF_TURN
     if turned:
-        other[2:] = other[2] + HALF_TURN, -pose[3]
+        other[[0, 3]] = -pose[0], other[3] + HALF_TURN
     np.testing.assert_allclose(within_limits(body, other), pose, atol=1e-11)
     # A flat rod shows which way it was turned about itself, but half a turn.
     flat = SWING.replace("radius_end = 9 }]", "radius_end = 9, scale_x = 0.5 }]")
@@ -146,9 +146,17 @@ def test_two_angles_about_one_axis_are_no_ball() -> None:
     """Whatever is done, the same frames come out."""
     text = SWING.replace('turn = "z", by = "c"', 'turn = "x", by = "c"')
     body = parse_body(text, "swing", "swing.toml")
-    pose = np.array([0.3 + HALF_TURN, HALF_TURN + 0.4, 0.5 + HALF_TURN, 0.6])
+    pose = np.array([0.6, 0.3 + HALF_TURN, HALF_TURN + 0.4, 0.5 + HALF_TURN])
     found = within_limits(body, pose)
     np.testing.assert_allclose(joint_frames(body, found), joint_frames(body, pose), atol=1e-9)
+
+
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_on_a_limit_of_a_joint_that_turns_more_than_once_a_pose_stays(side: str) -> None:
+    wide = SWING.replace("lower = 0, upper = 140", "lower = -200, upper = 200")
+    body = parse_body(wide, "wide", "wide.toml")
+    pose = np.array([getattr(body, side)[0], 0.1, 0.1, 0.1])
+    np.testing.assert_array_equal(within_limits(body, pose), pose)
 
 
 def test_a_ball_joints_other_angles_are_the_same_rotation() -> None:

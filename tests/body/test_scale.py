@@ -7,13 +7,16 @@ import pytest
 from numpy.typing import NDArray
 
 from studio.body.catalogue import list_bodies, load_body
-from studio.body.dimensions import with_dimensions
+from studio.body.dimensions import follows_height, with_dimensions, with_usual_feet
+from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
+from studio.body.reader import parse_body
 from studio.body.scale import scale_of
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.volume.body_space import space_of
 from studio.footage.calibration.silhouette_checks import stature_findings
 from studio.footage.calibration.standing import Posture
+from studio.foundations.errors import BodyError
 from studio.foundations.geometry.camera import Camera
 from studio.results.evaluation.errors import lost_mm
 from studio.runs.jumps import jumps_of
@@ -59,6 +62,64 @@ def test_a_mouse_and_a_small_person_are_an_eighth() -> None:
     assert scale_of(load_body("mouse")) == scale_of(SMALL) == EIGHTH
     assert scale_of(shrunk(load_body("mouse"), 8.0)) == 1.0
     assert lost_mm(SMALL) == EIGHTH * lost_mm(PERSON)
+
+
+@pytest.mark.parametrize(
+    ("longest", "scale"),
+    [
+        (1700.0, 1.0),
+        (851.0, 1.0),
+        (850.0, 0.5),
+        (3399.0, 1.0),
+        (3400.0, 2.0),
+        (610.0, 0.5),
+        (590.0, 0.25),
+        (0.6, 2.0**-11),
+    ],
+)
+def test_a_scale_is_the_nearest_power_of_two_of_the_longest_side(longest: float, scale: float) -> None:
+    text = ROD.replace("LONG", f"{longest}").replace("SHORT", f"{0.7 * longest}")
+    assert scale_of(parse_body(text, "rod", "rod.toml")) == scale
+
+
+ROD = """
+title = "Two rods"
+parameters = [{ name = "a", kind = "angle", limb = "x", max_step = 1 }]
+joints = [
+    { name = "one", parent = "world", type = "hinge", sequence = [{ turn = "z", by = "a" }] },
+    { name = "two", parent = "one", type = "fixed", sequence = [{ turn = "y", by = 90 }] },
+]
+limbs = [{ name = "one", joint = "one", length = LONG, radius_start = 1, radius_end = 1 },
+         { name = "two", joint = "two", length = SHORT, radius_start = 1, radius_end = 1 }]
+"""
+
+
+def test_a_body_of_which_nothing_is_drawn_has_a_persons_scale() -> None:
+    assert scale_of(parse_body(ROD.replace("LONG", "0").replace("SHORT", "0"), "rod", "rod.toml")) == 1.0
+
+
+def test_usual_feet_are_of_a_share_of_the_height_where_a_file_has_none() -> None:
+    plain = load_body("human31")
+    shod = with_usual_feet(plain)
+    height = float(np.ptp(limb_ends(plain, plain.neutral)[0, ..., 2]))
+    share = plain.definition.dimensions["left_foot_length"].of_height
+    for name, value in plain.dimensions.items():
+        wanted = share * height if name in ("left_foot_length", "right_foot_length") else value
+        assert shod.dimensions[name] == pytest.approx(wanted), name
+    assert with_usual_feet(shod) is shod
+    made = dataclasses.replace(plain, definition=None)
+    assert with_usual_feet(made) is made
+
+
+def test_a_body_follows_a_height_if_any_length_does() -> None:
+    person = load_body("human31")
+    assert follows_height(person)
+    assert not follows_height(load_body("planar_arm4"))
+    assert not follows_height(dataclasses.replace(person, definition=None))
+    with pytest.raises(BodyError, match="not read from a file"):
+        with_dimensions(dataclasses.replace(person, definition=None), {})
+    absent = with_dimensions(person, {"left_thigh_length": 0.0})
+    assert absent.dimensions["left_thigh_length"] == 0.0
 
 
 def test_a_small_person_is_refined_and_judged_like_a_large_one() -> None:
