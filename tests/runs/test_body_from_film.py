@@ -11,6 +11,8 @@ from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.editing import edited
 from studio.body.model import BodyModel
+from studio.body.reader import parse_body
+from studio.body.writing import body_text
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BodyError
 from studio.runs.setup.body_from_film import FilmedBody, FilmRequest, body_of_film
@@ -135,6 +137,20 @@ def test_clicks_that_say_too_little_are_refused_with_the_reason(arm: Session) ->
     two = [one for one in shifted if one.camera in ("cam1", "cam2")]
     with pytest.raises(BodyError, match="The clicks disagree"):
         body_of_film(arm, ARM, two)
+
+
+def test_a_body_whose_lengths_are_numbers_is_refused(arm: Session) -> None:
+    text = body_text(ARM)
+    for name in LINKS:
+        text = text.replace(f'by = "{name}"', "by = 250")
+    numbers = parse_body(text, "numbers", "numbers.toml")
+    clicks = clicks_on(
+        TRUE_ARM, [f"link_{one}" for one in range(1, 5)], varied_poses(TRUE_ARM, 6), AROUND_ARM
+    )
+    with pytest.raises(BodyError, match="No dimension of body 'numbers' moves") as refused:
+        body_of_film(arm, numbers, clicks)
+    assert "named dimensions" in refused.value.hint
+    assert np.abs(lengths_off(body_of_film(arm, ARM, clicks), TRUE_ARM)).max() < 0.02
 
 
 def test_views_along_the_same_line_are_refused(tmp_path: Path) -> None:

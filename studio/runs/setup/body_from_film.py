@@ -172,6 +172,11 @@ def body_of_film(
     tree = FilmedTree(
         template, tuple(dict.fromkeys(click.landmark for click in clicks)), symmetric=request.symmetric
     )
+    if not tree.groups:
+        raise BodyError(
+            f"No dimension of body '{template.name}' moves a clicked landmark.",
+            "Click other landmarks, or give the lengths in the body's file as named dimensions.",
+        )
     progress("triangulating the landmarks", 0, 4)
     seen = _Seen(tree.names, cameras, clicks, request.tolerance)
     usable = seen.usable()
