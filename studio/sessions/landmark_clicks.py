@@ -72,22 +72,25 @@ def keep_clicks(session: Session, clicks: Sequence[LandmarkClick]) -> None:
 def _read(path: Path) -> tuple[LandmarkClick, ...]:
     with foreign_file(path, FootageError, "a CSV file of clicked landmarks", FORMAT):
         lines = read_foreign_text(path, wrong=FootageError).splitlines()
-    first = next((line for line in lines if line.strip()), "")
-    separator = max(SEPARATORS, key=first.count)
-    rows = csv.DictReader(lines, delimiter=separator)
-    missing = [name for name in COLUMNS if name not in [head.strip() for head in rows.fieldnames or ()]]
+        first = next((line for line in lines if line.strip()), "")
+        separator = max(SEPARATORS, key=first.count)
+        rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator, strict=True)]
+    heads, *rows = [row for row in rows if any(row)] or [[]]
+    missing = [name for name in COLUMNS if heads.count(name) != 1]
     if missing:
-        raise FootageError(f"'{path.name}' has no column '{missing[0]}'.", FORMAT)
-    named = ({str(head).strip(): value for head, value in row.items()} for row in rows)
-    return tuple(_click(path, row) for row in named)
+        raise FootageError(f"'{path.name}' has no column '{missing[0]}', or several.", FORMAT)
+    places = [heads.index(name) for name in COLUMNS]
+    return tuple(_click(path, row, len(heads), places) for row in rows)
 
 
-def _click(path: Path, row: Mapping[str, str | None]) -> LandmarkClick:
+def _click(path: Path, row: Sequence[str], width: int, places: Sequence[int]) -> LandmarkClick:
     try:
-        frame, x, y = (float(row[name] or "") for name in ("frame", "x", "y"))
-        return LandmarkClick(int(frame), (row["camera"] or "").strip(), (row["landmark"] or "").strip(), x, y)
-    except (ValueError, OverflowError):
-        words = ",".join(str(row[name]) for name in COLUMNS)[:80]
+        if any(row[width:]):
+            raise ValueError
+        frame, camera, landmark, x, y = ([*row, *[""] * width][place] for place in places)
+        return LandmarkClick(int(frame), camera, landmark, float(x), float(y))
+    except ValueError:
+        words = ",".join(row)[:80]
         raise FootageError(f"'{path.name}' has a row that is no click: {words}.", FORMAT) from None
 
 

@@ -41,6 +41,7 @@ from studio.sessions.importers.bodytrack import read_numbers
 from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.mask_forms import form_of_masks
 from studio.sessions.importers.writing import carried_truth, check_person
+from studio.sessions.landmark_clicks import clicks_of_file, keep_clicks, stored_clicks
 from studio.sessions.live_recordings import read_sets
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.sessions.run_log import append_to_log, read_log
@@ -94,6 +95,24 @@ def _make_session(folder: Path) -> None:
     write_subject(Subject(session.manifest.body), session.path / "subject.toml")
     (session.path / "evidence.json").write_text('{"schema": 1, "knobs": {"background_model": "median"}}')
     verify(session)
+
+
+def _make_landmarks(folder: Path) -> None:
+    """A session beside a file of landmarks that were clicked in its pictures."""
+    session = make_session(folder / "toy", 3)
+    rows = [
+        f"{frame},{source.name},arm1 tip,{30.5 + frame},20"
+        for frame in range(3)
+        for source in session.manifest.footage.cameras
+    ]
+    (folder / "landmarks.csv").write_text("\n".join(["frame,camera,landmark,x,y", *rows]) + "\n")
+
+
+def _read_landmarks(folder: Path) -> None:
+    session = Session(folder / "toy")
+    clicks = clicks_of_file(session, folder / "landmarks.csv")
+    keep_clicks(session, clicks)
+    assert len(stored_clicks(session)) == len(clicks)
 
 
 def _projects(folder: Path) -> None:
@@ -232,6 +251,7 @@ FORMATS: Mapping[str, Format] = {
     "log": Format((read_log,)),
     "settings": Format((_read_settings,)),
     "address": Format((_each(lambda path: camera_address("cam1", path.read_text("latin-1"), replays=True)),)),
+    "landmarks": Format((_read_landmarks,), "landmarks.csv", _make_landmarks),
     "session-record": Format((_read_session,), "toy/session.json", _make_session),
     "session-files": Format((_read_session,), "toy/*.*", _make_session),
     "run-record": Format((_read_session,), "toy/runs/a/run.json", _make_session),
