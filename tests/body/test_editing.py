@@ -4,14 +4,16 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
 from studio.body.catalogue import list_bodies, load_body
-from studio.body.definition import BodyDefinition
+from studio.body.definition import BodyDefinition, MeshEntry
 from studio.body.editing import SIDES, BodyEdit, edited, other_side
 from studio.body.model import BodyModel
 from studio.body.reader import parse_body
+from studio.body.subject import Subject
 from studio.body.writing import body_text
 from studio.foundations.errors import BodyError
 
@@ -359,6 +361,27 @@ def test_a_text_of_a_body_has_short_numbers_and_nothing_that_goes_without_saying
     )
     with pytest.raises(BodyError, match="not read from a file"):
         body_text(replace(pincers().body, definition=None))
+
+
+def test_a_files_entries_are_what_they_are_and_hold_nothing_else() -> None:
+    body = definition_of(load_body("mouse"))
+    entries = [
+        body,
+        body.parameters[0],
+        body.joints[1],
+        body.joints[1].sequence[0],
+        body.limbs[0],
+        body.markers[0],
+    ]
+    entries += [next(iter(body.dimensions.values())), MeshEntry("arm", "", ""), Subject()]
+    for entry in entries:
+        table = msgspec.to_builtins(entry)
+        assert msgspec.convert(table, type(entry)) == entry
+        with pytest.raises(msgspec.ValidationError, match="colour"):
+            msgspec.convert({**table, "colour": "red"}, type(entry))
+        key = next(iter(table))
+        with pytest.raises(AttributeError):
+            setattr(entry, key, getattr(entry, key))
 
 
 def test_a_body_without_sides_cannot_be_mirrored() -> None:

@@ -302,6 +302,11 @@ def test_a_wrong_subject_file_is_named(tmp_path: Path, text: str, words: str) ->
     assert caught.value.hint
 
 
+def test_a_subject_cannot_be_changed() -> None:
+    with pytest.raises(AttributeError):
+        Subject().body = "dog"
+
+
 def test_a_missing_subject_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(BodyError, match="cannot be read"):
         read_subject(tmp_path / "subject.toml")

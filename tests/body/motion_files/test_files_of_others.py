@@ -107,6 +107,34 @@ def test_frames_counted_from_1_are_noticed(tmp_path: Path) -> None:
     assert "if it counts frames from 1" in other.notes[0]
 
 
+def frames_file(path: Path, rows: list[str]) -> Path:
+    path.write_text("frame,Head_x,Head_y,Head_z\n" + "".join(f"{row}\n" for row in rows))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("rows", "count", "times", "words"),
+    [
+        (["1,1,2,3", "2,4,5,6"], 2, [0.0, 1.0], "counts its frames from 1 to 2"),
+        (["0,1,2,3", "2,4,5,6"], 2, [0.0, 1.0, 2.0], ""),
+        (["0,,,", "1,1,2,3", "2,4,5,6", "3,,,"], 2, [0.0, 1.0, 2.0], "counts its frames from 1 to 2"),
+        (["1,1,2,3", "3,4,5,6"], 2, [0.0, 1.0, 2.0, 3.0], "begins with frame 1 (at 0.04 s)"),
+        (["2,1,2,3", "3,4,5,6"], 3, [0.0, 1.0, 2.0, 3.0], "begins with frame 2 (at 0.08 s)"),
+        (["5,,,"], 3, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], ""),
+    ],
+)
+def test_which_frame_a_file_begins_with_is_said(
+    tmp_path: Path, rows: list[str], count: int, times: list[float], words: str
+) -> None:
+    motion = read_truth(frames_file(tmp_path / "a.CSV", rows), 25.0, count)
+    np.testing.assert_allclose(motion.times, np.array(times) / 25.0, atol=1e-12)
+    assert len(motion.positions) == len(times)
+    assert len(motion.notes) == bool(words)
+    if words:
+        assert words in motion.notes[0]
+        assert ("count them from 0" in motion.notes[0]) is ("frame 1 " in words)
+
+
 def test_decimal_commas(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("frame;Head_x_mm;Head_y_mm;Head_z_mm\n0;-506,5755;1,5;2,25\n1;;;\n")

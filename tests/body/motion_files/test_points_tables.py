@@ -116,6 +116,8 @@ DLC = """
 MOTIVE = """
     Format~Version 1.23 Length~Units Meters -      -          -         -          -     -          -     -
     -     -
+    of    Name
+    of    Type
     -     Type   Marker   Marker   Marker   Bone     Rotation   Bone   Marker   Marker   Marker
     -     Name   S:A:Hip  S:A:Hip  S:A:Hip  S:Leg    S:Leg      S:Leg  Toe      Toe      Toe
     -     ID     1        1        1        2        2          2      3        3        3
