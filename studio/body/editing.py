@@ -146,8 +146,6 @@ def _with_limits(definition: BodyDefinition, limits: Mapping[str, float], notes:
             )
         if key not in LIMITS:
             _fail(f"'{name}'", f"names nothing of parameter '{parameter}'", f"It has {', '.join(LIMITS)}.")
-        if math.isnan(value):
-            _fail(f"Parameter '{parameter}'", f"has {key} nan", "Give a number.")
         changes.setdefault(parameter, {})[key] = value
     parameters = tuple(
         _limit(entry, changes[entry.name], notes) if entry.name in changes else entry

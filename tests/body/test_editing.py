@@ -287,6 +287,15 @@ def test_a_marker_of_one_side_alone_is_added_to_the_other() -> None:
     assert change.notes == ("Marker 'Jaw_R' was added, the mirror image of 'Jaw_L'.",)
 
 
+def test_a_mirrored_marker_is_written_to_a_micrometre() -> None:
+    change = edited(
+        load_body("human31"), markers=["Spot_L=left_thigh,12.3456789,-3.3333333,1.2345678"], mirror="left"
+    )
+    spot = next(one for one in change.body.markers if one.name == "Spot_R").offset
+    np.testing.assert_array_equal(spot, np.round(spot, 3))
+    assert np.abs(spot - np.round(spot, 2)).max() > 1e-4
+
+
 @pytest.mark.parametrize(
     "sizes",
     [

@@ -132,14 +132,14 @@ def test_names_of_twins() -> None:
     assert name_twins(names).tolist() == [1, 0, 2, 3, 4, 6, 5]
 
 
-@pytest.mark.parametrize("name", ["human29", "human34", "dog", "mouse31"])
+@pytest.mark.parametrize("name", ["human29", "human34", "dog", "mouse31", "branched_arms6"])
 def test_each_parameter_alone_is_mirrored_on_its_twin(name: str) -> None:
     """A person at rest whose one joint is bent: all points are the mirror image, through the middle of the sides."""
     body = load_body(name)
     mirror = Mirror(body)
-    rest = body.neutral
+    rest, root = body.neutral, root_joint(body)
     for at, entry in enumerate(body.parameters):
-        if at in body.joints[root_joint(body)].parameters:
+        if root >= 0 and at in body.joints[root].parameters:
             continue
         step = 0.1 if entry.upper - rest[at] > 0.1 else -0.1
         pose = rest + step * (np.arange(len(rest)) == at)
@@ -227,6 +227,19 @@ def test_limbs_change_places_by_their_own_joints_and_all_else_stays() -> None:
 
     assert miss(found) < 0.8 * miss(pose)
     assert is_least(body, lambda one: (limb_ends(body, one)[0][limbs] - target).ravel(), found, own)
+
+
+def test_a_root_is_sought_from_the_pose_and_from_half_a_turn_about_each_of_its_axes() -> None:
+    body = load_body("human31")
+    pose = some_pose(body)
+    begun = np.array(Mirror(body)._beginnings(pose)) - pose
+    wanted = np.zeros((4, len(pose)))
+    turns = [at for at in body.joints[root_joint(body)].parameters if body.angles[at]]
+    wanted[[1, 2, 3], turns] = np.pi
+    np.testing.assert_allclose(begun, wanted, atol=1e-9)
+    fitted, rest = Mirror(body)._fit(pose, limb_ends(body, pose)[0], np.zeros(0, np.int64))
+    assert rest == 0.0
+    np.testing.assert_array_equal(fitted, pose)
 
 
 def test_facing_the_other_way_every_limb_is_near_where_its_twin_was() -> None:
