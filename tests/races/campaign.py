@@ -223,13 +223,15 @@ def _served(stage: Stage, given: Given, verb: str) -> Outcome:
     if not answer.is_success:
         words = f"{said.get('message')} {said.get('hint')}"
         return Outcome("wrong" if answer.status_code >= 500 else "refused", words)
+    if answer.status_code != 202:
+        return Outcome("done")
     of = said.get("session") or given.name
     key = said.get("identifier") or of
     if path.startswith("/api/comparisons"):
         key = f"{given.name}/{said.get('name')}"
     while True:
         jobs = client.get("/api/jobs", params={"session": of}).json()["jobs"]
-        mine = [job for job in jobs if job["key"] == key] if answer.status_code == 202 else []
+        mine = [job for job in jobs if job["key"] == key]
         if not any(job["state"] in ("queued", "running", "cancelling") for job in mine):
             break
         time.sleep(0.02)

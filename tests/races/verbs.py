@@ -236,6 +236,7 @@ PYTHON: Mapping[str, Callable[[Given], object]] = {
     "split the error": lambda at: studio.split_error(at.run, frame=1, evaluations=1000),
     "uncertainty": lambda at: studio.uncertainty(at.run),
     "rig": lambda at: studio.rig(at.run),
+    "body from film": lambda at: studio.body_from_film(at.name, save_as=at.called("filmed")),
     "view": lambda at: studio.view(at.run, "variance"),
     "why": lambda at: studio.why(at.run, 1),
     "workflow": lambda at: studio.workflow(at.name),
@@ -328,6 +329,12 @@ SERVED: Mapping[str, Callable[[Given], Request]] = {
             ]
         },
     ),
+    "served landmarks": lambda at: (
+        "PUT",
+        "/landmarks",
+        {"clicks": [{"frame": 0, "camera": "front", "landmark": "Tip", "x": 40.0 + at.place, "y": 30.0}]},
+    ),
+    "served body from film": lambda at: ("POST", "/body-from-film", {}),
     "served mask quality": lambda at: ("POST", "/masks/quality", None),
     "served background off": lambda at: ("DELETE", "/background", None),
     "served synchrony": lambda at: ("POST", "/synchrony", {}),
@@ -386,7 +393,12 @@ TRACKING = {
     )
 }
 """Verbs that the server's tracking process has a part in."""
-ALONE = ("Too few silhouettes", "The cameras' pictures are not level", "Camera front has")
+ALONE = (
+    "Too few silhouettes",
+    "The cameras' pictures are not level",
+    "Camera front has",
+    "Every landmark is clicked in one view",
+)
 """Begin what a verb is refused with where nothing else goes on."""
 SLOW = {"fit the subject", "initialise", "compare", "sweep", "batch", "live", "record"}
 """Verbs that take seconds."""
