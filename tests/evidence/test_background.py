@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import cv2
 import numpy as np
 import pytest
 
@@ -9,8 +10,13 @@ from studio.evidence.background import (
     MIXED,
     GaussianBackground,
     SubtractorBackground,
+    differing_pixels,
+    drop_shadows,
+    gain_ratios,
     gaussian_from_frames,
     gaussian_from_median,
+    possible_shadows,
+    shadows_together,
 )
 from studio.evidence.settings import EvidenceSettings
 
@@ -218,3 +224,189 @@ def test_differences_are_those_of_every_pixel(threshold: float, noise: float) ->
 
 def test_what_never_changes_has_no_deviation() -> None:
     assert (gaussian_from_frames([seen(ROOM, 1)] * 3).variance == 0.0).all()
+
+
+def shaded(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A picture (18, 23, 3), its background's mean, and which pixels changed: most of them shadows of some kind."""
+    rng = np.random.default_rng(seed)
+    mean = rng.uniform(2.0, 230.0, (18, 23, 3)).astype(np.float32)
+    share = rng.uniform(0.3, 1.1, (18, 23, 1))
+    picture = np.clip(mean * share + rng.normal(0.0, 3.0, mean.shape), 0.0, 255.0).astype(np.uint8)
+    changed = np.where(rng.random((18, 23)) < 0.8, np.uint8(255), np.uint8(0))
+    changed[:2], changed[:, :3], changed[17], changed[:, 21:] = 0, 0, 0, 0
+    return picture, mean, changed
+
+
+GAIN = np.array([0.9, 1.05, 1.2], np.float32)
+
+
+def off_colour(value: np.ndarray, wanted: np.ndarray) -> tuple[float, float, float]:
+    """The share of the wanted colour in a colour, what is left of it, squared, and the wanted one's square."""
+    norm = float(wanted @ wanted)
+    share = float(value @ wanted) / max(norm, 1.0)
+    return share, float(value @ value) - share * float(value @ wanted), norm
+
+
+def plainly_possible(picture: np.ndarray, mean: np.ndarray, changed: np.ndarray, noise: float) -> np.ndarray:
+    out = np.zeros_like(changed)
+    for y, x in np.argwhere(changed):
+        share, away, norm = off_colour(picture[y, x].astype(float), (GAIN * mean[y, x]).astype(float))
+        if 0.5 <= share < 1.0 and away < 0.05**2 * norm + noise:
+            out[y, x] = 255
+    return out
+
+
+def plainly_together(
+    picture: np.ndarray, mean: np.ndarray, possible: np.ndarray, noise: float, reach: int
+) -> np.ndarray:
+    out, sixteenths = np.zeros_like(possible), np.rint(16.0 * GAIN * mean) / 16.0
+    for y, x in np.argwhere(possible):
+        around = np.s_[max(y - reach, 0) : y + reach + 1, max(x - reach, 0) : x + reach + 1]
+        chosen = possible[around] > 0
+        value, wanted = picture[around][chosen].mean(axis=0), sixteenths[around][chosen].mean(axis=0)
+        _, away, norm = off_colour(value, wanted.astype(float))
+        if away < 0.05**2 * norm + noise / chosen.sum():
+            out[y, x] = 255
+    return out
+
+
+def box_of(mask: np.ndarray) -> tuple[int, int, int, int]:
+    rows, columns = np.nonzero(mask)
+    return columns.min(), rows.min(), np.ptp(columns) + 1, np.ptp(rows) + 1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_may_be_shadow_is_darker_and_of_the_backgrounds_colour(seed: int) -> None:
+    picture, mean, changed = shaded(seed)
+    mean[5, 5], picture[5, 5], changed[5, 5] = 0.0, 0, 255  # as black as can be
+    limits = np.float32(30.0), np.float32(0.5), np.float32(0.05)
+    possible = possible_shadows(changed, box_of(changed), picture, mean, GAIN, *limits)
+    np.testing.assert_array_equal(possible, plainly_possible(picture, mean, changed, 30.0))
+    assert 0.1 < (possible > 0)[changed > 0].mean() < 0.9
+    part = possible_shadows(changed, (4, 3, 9, 7), picture, mean, GAIN, *limits)
+    expected = np.zeros_like(possible)
+    expected[3:10, 4:13] = possible[3:10, 4:13]
+    np.testing.assert_array_equal(part, expected)
+
+
+@pytest.mark.parametrize("reach", [1, 2, 7])
+def test_shadows_together_are_those_of_the_mean_colours_around(reach: int) -> None:
+    for seed in range(4):
+        picture, mean, changed = shaded(seed)
+        possible = np.where(changed > 0, plainly_possible(picture, mean, changed, 300.0), 0).astype(np.uint8)
+        given = possible, box_of(possible), picture, mean, GAIN, np.float32(9.0), np.float32(0.05), reach
+        expected = plainly_together(picture, mean, possible, 9.0, reach)
+        np.testing.assert_array_equal(shadows_together(*given), expected)
+        assert 0.01 < (expected > 0)[possible > 0].mean() < 0.97
+
+
+@pytest.mark.parametrize("reach", [0, 2])
+def test_shadows_are_dropped_together_and_at_the_border_alone(reach: int) -> None:
+    for seed in range(4):
+        picture, mean, changed = shaded(seed)
+        given = picture, mean, GAIN, np.float32(9.0), np.float32(0.5), np.float32(0.05), reach
+        left = drop_shadows(changed, *given)
+        if reach:
+            possible = plainly_possible(picture, mean, changed, 9.0 * 9.0)
+            expected = changed - plainly_together(picture, mean, possible, 9.0, reach)
+            inner = cv2.erode(expected, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
+            for y, x in np.argwhere(expected - inner):
+                wanted = (GAIN * mean[y, x]).astype(float)
+                share, away, norm = off_colour(picture[y, x].astype(float), wanted)
+                if 0.5 <= share < 1.0 and away < (1.6 * 0.05) ** 2 * norm + 9.0:
+                    expected[y, x] = 0
+        else:
+            expected = changed - plainly_possible(picture, mean, changed, 9.0)
+        np.testing.assert_array_equal(left, expected)
+        assert 0.1 < (left > 0)[changed > 0].mean() < 0.95
+
+
+def test_a_gain_is_the_median_ratio_of_every_eighth_pixel_that_is_neither_dark_nor_bright() -> None:
+    rng = np.random.default_rng(5)
+    mean = rng.integers(0, 256, (180, 181, 3)).astype(np.uint8)
+    mean[::8, ::16] = np.array([20, 245, 21], np.uint8)
+    picture = np.clip(mean * [0.8, 1.1, 2.5] + rng.normal(0.0, 9.0, mean.shape), 0, 255).astype(np.uint8)
+    picture[::8, 8::16, 0] = 245
+    background = GaussianBackground(mean)
+    samples = mean[::8, ::8].astype(np.float32)
+    ratios, counts = gain_ratios(picture, samples)
+    gains = background.gain(picture)
+    for c, (gain, least, most) in enumerate(zip(gains, (0.5,) * 3, (2.0,) * 3, strict=True)):
+        value, behind = picture[::8, ::8, c].astype(np.float32), samples[..., c]
+        usable = (behind > 20.0) & (behind < 245.0) & (value < 245.0)
+        expected = value[usable] / behind[usable]
+        np.testing.assert_array_equal(ratios[c, : counts[c]], expected)
+        assert gain == np.float32(np.clip(np.median(expected), least, most) if len(expected) >= 64 else 1.0)
+    assert len(set(gains.tolist())) == 3
+    bright, dark = np.full((80, 80, 3), 200, np.uint8), np.full((80, 80, 3), 40, np.uint8)
+    assert (GaussianBackground(bright).gain(dark) == 0.5).all()
+
+
+@pytest.mark.parametrize(("count", "gain"), [(63, 1.0), (64, 0.75)])
+def test_a_gain_takes_sixty_four_pixels(count: int, gain: float) -> None:
+    mean = np.zeros((64, 64, 3), np.uint8)
+    for number in range(count):
+        mean[8 * (number // 8), 8 * (number % 8)] = 100
+    assert GaussianBackground(mean).gain((mean * 0.75).astype(np.uint8)).tolist() == [gain] * 3
+
+
+def test_a_background_is_grey_where_its_colours_hardly_differ() -> None:
+    level = np.full((16, 16, 3), 100, np.uint8)
+    for apart, grey in ((1, True), (2, False), (3, False)):
+        level[..., 2] = 100 + apart
+        assert GaussianBackground(level).is_grey == grey
+    settings = dataclasses.replace(SETTINGS, mask_shadow_test=True)
+    assert GaussianBackground(level).tests_shadows(settings)
+    assert not GaussianBackground(level).tests_shadows(dataclasses.replace(settings, mask_shadow_test=False))
+    level[..., 2] = 100
+    assert not GaussianBackground(level).tests_shadows(settings)
+
+
+def test_two_pictures_have_a_mean_and_a_deviation_and_a_plate_none() -> None:
+    rng = np.random.default_rng(2)
+    one, other = rng.integers(0, 256, (2, 7, 9, 3), dtype=np.uint8)
+    background = gaussian_from_frames([one, other])
+    np.testing.assert_allclose(background.mean, (one / 2.0 + other / 2.0), rtol=1e-6)
+    deviation = np.abs(one.astype(float) - other) / 2.0
+    np.testing.assert_allclose(np.sqrt(background.variance), deviation, rtol=1e-4, atol=1e-3)
+    plate = gaussian_from_frames([one])
+    assert plate.mean.dtype == np.uint8
+    assert plate.variance.shape == (1, 9, 3)
+    assert not plate.variance.any()
+
+
+def test_a_mean_between_grey_levels_is_compared_as_it_is() -> None:
+    """Rounded means only tell where nothing needs to be looked at: half a level decides here, times the gain."""
+    mean = np.full((3, 40, 3), 100.5, np.float32)
+    variance = np.zeros((1, 40, 3), np.float32)
+    variance[0, 20:] = 25.0
+    picture = np.full((3, 40, 3), 201, np.uint8)
+    picture[1, :, 1], picture[2, ::3, 2] = 205, 197
+    gain, rough = np.full(3, 2.0, np.float32), np.rint(mean).astype(np.uint8)
+    for threshold in (0.99, 1.01):
+        given = gain, np.float32(threshold), np.float32(16.0)
+        found = differing_pixels(picture, mean, rough, variance, *given)
+        expected = np.zeros((3, 40), np.uint8)
+        if threshold < 1.0:
+            expected[1, :20], expected[2, :20:3] = 255, 255
+        np.testing.assert_array_equal(found, expected)
+    exactly = differing_pixels(picture, mean, rough, variance, gain, np.float32(1.0), np.float32(16.0))
+    assert not exactly.any()
+
+
+@pytest.mark.parametrize("kind", ["mog2", "knn"])
+def test_opencvs_models_mark_the_shadow(kind: str) -> None:
+    frame, mask = scene(1)
+    background = SubtractorBackground(kind, [seen(ROOM, seed) for seed in range(100, 140)])
+    given = dataclasses.replace(SETTINGS, mask_shadow_darkest=0.5)
+    found = background.foreground(frame, given)
+    assert set(np.unique(found.shadow)) == {0, 255} == set(np.unique(found.mask))
+    assert (found.shadow > 0)[SHADOW].mean() > 0.6
+    assert (found.shadow > 0)[mask].mean() < 0.05
+    assert not (found.shadow & found.mask).any()
+    stricter = background.foreground(frame, dataclasses.replace(given, mask_shadow_darkest=0.9))
+    assert (stricter.shadow > 0)[SHADOW].mean() < 0.05
+    higher = background.foreground(
+        frame, dataclasses.replace(given, mask_threshold=3.0 * SETTINGS.mask_threshold)
+    )
+    assert 0.0 < (higher.mask > 0).mean() < (found.mask > 0).mean() + 0.01
