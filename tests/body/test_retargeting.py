@@ -178,6 +178,9 @@ def test_a_curve_above_heights_rises_as_it_falls_and_holds_the_highest() -> None
     curve = smooth_above(heights, 6)
     np.testing.assert_allclose(curve, curve[::-1], atol=1e-12)
     assert curve[20] == pytest.approx(5.0)
+    kernel = np.exp(-0.5 * (np.arange(-6, 7) / 2.0) ** 2)
+    held = np.where(np.abs(np.arange(41) - 20) <= 6, 5.0, 0.0)
+    np.testing.assert_allclose(curve, np.convolve(held, kernel / kernel.sum(), mode="same"), atol=1e-12)
     assert (curve >= heights).all()
     # Held as far as the smoothing reaches, which is as far again.
     assert np.flatnonzero(curve > 1e-12).tolist() == list(range(8, 33))

@@ -360,6 +360,12 @@ def test_parameters_have_the_files_limits_its_keyframe_and_the_limb_of_their_cha
         assert entry.neutral == pytest.approx(neutral), entry.name
         assert entry.max_step == pytest.approx(500.0 if entry.kind == "length" else np.pi), entry.name
     assert [entry.name for entry in crane.parameters if entry.kind == "length"] == ["reach", "claw"]
+    # About an axis of the frame, or against it, nothing else is turned.
+    spin = next(joint for joint in crane.definition.joints if joint.name == "left column").sequence
+    assert [(step.turn, step.by) for step in spin if step.turn] == [
+        ("z", pytest.approx(np.degrees(0.5))),
+        ("z", "-spin"),
+    ]
 
 
 def test_every_part_lies_where_its_geometry_does_and_is_as_large(crane: BodyModel) -> None:

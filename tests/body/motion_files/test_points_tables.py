@@ -121,8 +121,8 @@ MOTIVE = """
     -     Type   Marker   Marker   Marker   Bone     Rotation   Bone   Marker   Marker   Marker
     -     Name   S:A:Hip  S:A:Hip  S:A:Hip  S:Leg    S:Leg      S:Leg  Toe      Toe      Toe
     -     ID     1        1        1        2        2          2      3        3        3
-    -     -      Position Position Position Position Rotation   Error  Position Position Position
-    Frame Time   X        Y        Z        X        X          X      X        Y        Z
+    -     -      Position Position Position Position Rotation   Error  Position Position Position Position
+    Frame Time   X        Y        Z        X        X          X      X        Y        Z        X        Y
     0     0.0    1        2        3        4        5          6      7        8        9
     1     0.1    10       -        -        -        -          -      11       -        12
     2     0.2    13
