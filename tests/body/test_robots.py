@@ -270,6 +270,10 @@ def test_links_without_geometry_get_the_stated_radius(tmp_path: Path) -> None:
     )
     for limb in lift:
         assert limb.radius_start == pytest.approx(THIN * limb.length, abs=1e-3)
+    ends = limb_ends(body, body.neutral)[0]
+    places = markers(body, body.neutral[None], ["lift", "left_finger", "right_finger"])[0]
+    for limb, place in zip(lift, places[1:], strict=True):
+        np.testing.assert_allclose(ends[body.drawn.index(limb)], [places[0], place], atol=1e-5)
     source = body.definition.source
     assert "nowhere/finger.dae" in source
     assert "without geometry" in source
