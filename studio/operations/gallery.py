@@ -167,6 +167,22 @@ CARDS = (
         guide="/guide/adding#a-robot",
     ),
     Card(
+        "fly",
+        "A tethered fly on a ball",
+        "Seven grey cameras, 15 frames, no empty picture: its body's lengths come from landmarks clicked in the film.",
+        "elsewhere",
+        data="github.com/NeLy-EPFL/DeepFly3D (LGPL-3), tests/data/reference: pictures, calibration, a network's points.",
+        footage="fly",
+        unit="mm",
+        fps=100.0,
+        commands=(
+            "studio import fly --unit mm --fps 100 --into fly",
+            "studio subject fly --body fly48",
+            "studio body-from-film fly --like fly48 --as my-fly",
+        ),
+        guide="/guide/animal",
+    ),
+    Card(
         "wood",
         "A person drawn by others",
         "Clothes that are not ours, a floor of skin's colour, exact truth.",
