@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from studio.evidence.distance_maps import distances_of
+from studio.evidence.distance_maps import (
+    box_of,
+    distances_of,
+    silhouette_distances,
+    silhouettes_by_camera,
+    slopes_at,
+)
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 
 
 def disc(size: int = 61, radius: float = 17.0) -> np.ndarray:
@@ -101,3 +108,104 @@ def test_distances_cover_what_is_hidden_far_from_the_mask(left: int, top: int) -
     assert y >= 0
     assert (found.signed[y : y + 6, x : x + 6] == 0.0).all()
     assert found.signed[y : y + 6, x : x + 6].shape == (6, 6)
+
+
+def test_a_box_is_around_the_pixels_that_are_bright_enough() -> None:
+    rng = np.random.default_rng(1)
+    for count in (1, 2, 5):
+        for _ in range(30):
+            picture = rng.integers(0, 128, (7, 9), dtype=np.uint8)
+            picture[rng.integers(0, 7, count), rng.integers(0, 9, count)] = 128
+            rows, columns = np.nonzero(picture == 128)
+            wanted = columns.min(), rows.min(), columns.max() + 1, rows.max() + 1
+            assert box_of(picture, np.uint8(128)) == wanted
+            assert box_of(picture, np.uint8(129)) == (0, 0, 0, 0)
+
+
+def test_slopes_are_unit_vectors_upwards_and_none_where_it_is_flat() -> None:
+    values = np.random.default_rng(2).normal(size=(8, 9)).astype(np.float32)
+    values[5:8, 5:8] = 0.25
+    points = np.array([[x, y] for y in range(1, 7) for x in range(1, 8)])
+    slopes = slopes_at(points, values)
+    for (x, y), slope in zip(points, slopes, strict=True):
+        rise = np.array([values[y, x + 1] - values[y, x - 1], values[y + 1, x] - values[y - 1, x]], float)
+        np.testing.assert_allclose(slope, rise / max(np.linalg.norm(rise), 1e-9), rtol=1e-6)
+    assert (slopes[[*map(tuple, points)].index((6, 6))] == 0.0).all()
+
+
+@pytest.mark.parametrize("level", [127, 128])
+def test_distances_are_kept_up_to_a_sixteenth_of_the_longer_side_from_pixels_half_as_bright(
+    level: int,
+) -> None:
+    mask = np.zeros((90, 160), np.uint8)
+    mask[30:40, 50:70] = level
+    found = distances_of(mask)
+    assert found.size == (160, 90)
+    if level < 128:
+        assert found.signed.shape == (0, 0)
+        assert found.corner == (0, 0)
+        return
+    assert found.corner == (40, 20)
+    assert found.signed.shape == (30, 40)
+    y, x = np.mgrid[20:50, 40:80]
+    away = np.hypot(np.maximum(np.maximum(50 - x, x - 69), 0), np.maximum(np.maximum(30 - y, y - 39), 0))
+    within = np.minimum(np.minimum(x - 49, 70 - x), np.minimum(y - 29, 40 - y))
+    np.testing.assert_allclose(found.signed, np.where(away > 0, away - 0.5, 0.5 - within), atol=1e-6)
+    border = {(int(px), int(py)) for px, py in found.border}
+    inner = (x > 50) & (x < 69) & (y > 30) & (y < 39)
+    rim = (away == 0) & ~inner
+    assert border == {*zip(x[rim].tolist(), y[rim].tolist(), strict=True)}
+    for (px, py), outward in zip(found.border, found.outward, strict=True):
+        if 54 < px < 65:
+            np.testing.assert_allclose(outward, (0.0, -1.0 if py == 30 else 1.0), atol=0.02)
+    cornered = np.zeros((90, 160), np.uint8)
+    cornered[:5, :6] = cornered[85:, 150:] = 255
+    whole = distances_of(cornered)
+    assert (whole.corner, whole.signed.shape) == ((0, 0), (90, 160))
+    assert whole.border.min() > 0
+    assert (whole.border < (159, 89)).all()
+    assert {(5, 1), (1, 4), (150, 88), (158, 85)} <= {(int(px), int(py)) for px, py in whole.border}
+
+
+def test_border_points_are_every_so_manieth_and_none_within_two_pixels_of_what_is_hidden() -> None:
+    mask = np.zeros((90, 160), np.uint8)
+    mask[30:40, 50:70] = 255
+    everything = distances_of(mask).border
+    assert len(everything) == 56
+    for most, kept in ((56, 56), (55, 28), (28, 28), (27, 19), (1, 1)):
+        np.testing.assert_array_equal(distances_of(mask, most).border, everything[:: -(-56 // most)])
+        assert len(distances_of(mask, most).border) == kept
+    hidden = np.zeros_like(mask)
+    hidden[35, 60] = hidden[32, 73] = 1
+    left = {(int(x), int(y)) for x, y in distances_of(mask, hidden=hidden).border}
+    gone = {(int(x), int(y)) for x, y in everything} - left
+    assert gone == set()
+    hidden[32, 72] = 1
+    hidden[38, 60] = 1
+    left = {(int(x), int(y)) for x, y in distances_of(mask, hidden=hidden).border}
+    gone = {(int(x), int(y)) for x, y in everything} - left
+    assert gone == {*((x, 39) for x in range(58, 63))}
+    hidden[32, 71] = 1
+    left = {(int(x), int(y)) for x, y in distances_of(mask, hidden=hidden).border}
+    assert {(int(x), int(y)) for x, y in everything} - left - gone == {(69, y) for y in range(30, 35)}
+
+
+def test_every_views_distances_are_kept_as_long_as_the_evidence() -> None:
+    hidden = np.zeros_like(disc())
+    hidden[:, 36:58] = 255
+    views = [
+        ViewEvidence("a", np.zeros((61, 61, 3), np.uint8), disc(), disc()),
+        ViewEvidence("b", np.zeros((61, 61, 3), np.uint8), disc(), disc(), hidden=hidden),
+    ]
+    evidence = FrameEvidence(3, tuple(views))
+    exact, stepped = silhouette_distances(evidence, 20), silhouettes_by_camera(evidence, 20)
+    for view, one in zip(views, exact, strict=True):
+        for found, wanted in (
+            (one, distances_of(view.mask, 20, hidden=view.hidden)),
+            (stepped[view.camera], distances_of(view.mask, 20, exact=False, hidden=view.hidden)),
+        ):
+            np.testing.assert_array_equal(found.signed, wanted.signed)
+            np.testing.assert_array_equal(found.border, wanted.border)
+    assert silhouettes_by_camera(evidence, 20) is stepped
+    assert len(silhouettes_by_camera(evidence)["a"].border) > 20
+    assert (stepped["a"].signed != exact[0].signed).any()

@@ -7,7 +7,8 @@ import pytest
 from posed_hulls import empty_hull, hull_of, learn_blobs, limb_colours, near, plain
 
 from studio.body.catalogue import load_body
-from studio.body.model import BodyModel
+from studio.body.forward_kinematics import limb_frames
+from studio.body.model import BodyModel, kinematic_tables
 from studio.evidence.volume.blob_acquisition import (
     BINS,
     SEEN,
@@ -17,7 +18,9 @@ from studio.evidence.volume.blob_acquisition import (
     colour_change,
     parts_of,
 )
+from studio.evidence.volume.blob_fitting import Voxels, nearest_blobs
 from studio.evidence.volume.blob_model import cone_blobs, cone_moments
+from studio.evidence.volume.hull import Hull
 
 Array = np.ndarray
 
@@ -169,3 +172,109 @@ def test_what_is_seen_of_a_limb_has_to_be_a_share_of_it_in_every_frame(body: Bod
         sums[shin] = slices * (share * 6.0 * enough / slices[:, 0].sum())
         model = blobs_of(body, Profiles(sums, 6), 12.0)
         assert np.isfinite(model.colour[model.limb == shin]).all() == learnt
+
+
+def test_a_slice_holds_what_the_voxels_of_its_stretch_of_the_limb_sum_to(body: BodyModel) -> None:
+    pose = near(body, body.neutral, 7, frames=4)
+    fine = hull_of(body, pose, spacing=35.0)
+    edges = np.random.default_rng(1).choice([20.0, 40.0], len(fine.edges))
+    hull = Hull(fine.centres, edges, fine.colours, fine.view_colours, 7, fine.box)
+    model = cone_blobs(body)
+    profiles = Profiles.none(body).with_frame(body, model, hull, pose)
+    voxels = Voxels.of(hull)
+    coloured = model.in_colour(voxels.colour, voxels.colour_variance)
+    limbs = model.limb[nearest_blobs(voxels, coloured.mixture(body, pose).at(0))]
+    frames, lengths = limb_frames(body, pose)[0], kinematic_tables(body).limb_shape[:, 0]
+    expected, slices = np.zeros((len(body.drawn), 24, 16)), set()
+    for limb, centre, edge, colour in zip(
+        limbs, hull.centres, hull.edges, hull.colours.astype(float), strict=True
+    ):
+        x, y, z = place = frames[limb, :, :3].T @ (centre - frames[limb, :, 3])
+        along = z / lengths[limb]
+        # Twenty-four slices from a tenth before the limb to a tenth behind it.
+        number = min(max(int(np.floor((along + 0.1) * 20.0)), 0), 23)
+        slices.add(number)
+        row = [1.0, x, y, z, *(place**2 + edge**2 / 12.0), *(z * colour), *colour, *colour**2]
+        expected[limb, number] += edge**3 * np.array(row)
+    np.testing.assert_allclose(profiles.sums, expected, rtol=1e-6, atol=1e-3)
+    assert profiles.frames == 1
+    assert {0, 1, 12, 22} <= slices
+
+
+def plain_criterion(slices: Array) -> float:
+    sums = slices.sum(axis=0)
+    place, colour = sums[3] / sums[0], sums[10:13] / sums[0]
+    spread = max(sums[6] / sums[0] - place**2, 25.0)
+    return float(np.linalg.norm(sums[7:10] / sums[0] - place * colour) / np.sqrt(spread))
+
+
+def plain_parts(slices: Array, split: float, most: int) -> list[tuple[int, int]]:
+    """Cut by cut, each where the two parts' colours vary least, then union by union."""
+    parts, volume = [(0, len(slices))], slices[:, 0].sum()
+    while len(parts) < most:
+        cuts = []
+        for first, last in parts:
+            change = plain_criterion(slices[first:last]) if slices[first:last, 0].sum() else 0.0
+            within = []
+            for cut in range(first + 1, last):
+                sides = slices[first:cut].sum(axis=0), slices[cut:last].sum(axis=0)
+                if min(side[0] for side in sides) >= max(0.15 * volume, 1e-300):
+                    varied = sum((side[13:16] - side[10:13] ** 2 / side[0]).sum() for side in sides)
+                    within.append((varied, cut))
+            if change > split and within:
+                cuts.append((change, first, last, min(within)[1]))
+        if not cuts:
+            break
+        _, first, last, cut = max(cuts)
+        at = parts.index((first, last))
+        parts[at : at + 1] = [(first, cut), (cut, last)]
+    while len(parts) > 1:
+        unions = [plain_criterion(slices[a:b]) for (a, _), (_, b) in itertools.pairwise(parts)]
+        if min(unions) >= 0.5 * split:
+            break
+        at = int(np.argmin(unions))
+        parts[at : at + 2] = [(parts[at][0], parts[at + 1][1])]
+    return parts
+
+
+def test_parts_of_any_limb_are_those_of_cuts_and_unions_one_by_one() -> None:
+    rng, counts = np.random.default_rng(3), []
+    for number in range(40):
+        levels = rng.choice([40.0, 70.0, 120.0, 190.0], (rng.choice([2, 3, 4, 6, 8]), 3))
+        slices = slices_of(np.repeat(levels, BINS // len(levels), axis=0), length=rng.choice([20.0, 400.0]))
+        slices *= rng.uniform(0.3, 1.5, (BINS, 1))
+        if number % 3 == 0:
+            slices[: rng.integers(1, 6)] = 0.0
+        split, most = rng.uniform(4.0, 30.0), int(rng.integers(2, 6))
+        parts = parts_of(slices, split, most)
+        assert parts == plain_parts(slices, split, most)
+        assert most != 4 or parts_of(slices, split) == parts
+        counts.append(len(parts))
+    assert {1, 2, 3, 4} <= set(counts)
+
+
+def test_a_blob_is_described_by_the_moments_of_its_slices(body: BodyModel) -> None:
+    shin, frames = limb_number(body, "left shin"), 3
+    slices = slices_of(stepped(80.0, 150.0), spread=9.0)
+    sums = np.zeros((len(body.drawn), BINS, SUMS))
+    sums[shin] = slices * (5.0 * frames * cone_moments(body).volume[shin] / slices[:, 0].sum())
+    model = blobs_of(body, Profiles(sums, frames), 12.0)
+    own = np.flatnonzero(model.limb == shin)
+    assert len(own) == 2
+    volumes = np.where(np.arange(len(body.drawn)) == shin, 0.0, 0.05 * frames * cone_moments(body).volume)
+    whole = volumes.sum() + sums[shin, :, 0].sum()
+    for blob, part in zip(own, (sums[shin, :12].sum(axis=0), sums[shin, 12:].sum(axis=0)), strict=True):
+        means = part[1:4] / part[0]
+        assert model.offset[blob] == pytest.approx(means[2])
+        np.testing.assert_allclose(model.eigenvalues[blob], np.maximum(part[4:7] / part[0] - means**2, 25.0))
+        colour = part[10:13] / part[0]
+        np.testing.assert_allclose(model.colour[blob], colour)
+        np.testing.assert_allclose(
+            model.colour_variance[blob], np.maximum(part[13:16] / part[0] - colour**2, 36.0)
+        )
+        assert model.weight[blob] == pytest.approx(part[0] / whole)
+    unseen = np.flatnonzero(model.limb != shin)
+    np.testing.assert_allclose(model.weight[unseen], np.delete(volumes, shin) / whole)
+    np.testing.assert_array_equal(
+        model.eigenvalues[unseen], np.delete(cone_blobs(body).eigenvalues, shin, axis=0)
+    )
