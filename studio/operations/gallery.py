@@ -171,7 +171,7 @@ CARDS = (
         "A tethered fly on a ball",
         "Seven grey cameras, 15 frames, no empty picture: its body's lengths come from landmarks clicked in the film.",
         "elsewhere",
-        data="github.com/NeLy-EPFL/DeepFly3D (LGPL-3), tests/data/reference: pictures, calibration, a network's points.",
+        data="github.com/NeLy-EPFL/DeepFly3D (LGPL-3), tests/data/reference: pictures, cameras, a network's points.",
         footage="fly",
         unit="mm",
         fps=100.0,
