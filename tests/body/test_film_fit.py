@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from filmed_bodies import cameras_around
 
+from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.film_fit import (
     FilmedTree,
@@ -39,7 +40,8 @@ parameters = [
     { name = "right_bend", kind = "angle", limb = "right", max_step = 1, lower = -80, upper = 60, neutral = -10 },
 ]
 joints = [
-    { name = "shell", parent = "world", type = "free", sequence = [
+    { name = "stand", parent = "world", type = "fixed" },
+    { name = "shell", parent = "stand", type = "free", sequence = [
         { move = "x", by = "x" }, { move = "y", by = "y" }, { move = "z", by = "z" },
         { turn = "z", by = "heading" }, { turn = "y", by = "pitch" }, { turn = "x", by = "roll" },
     ] },
@@ -61,7 +63,7 @@ limbs = [
     { name = "left claw", joint = "left_claw", length = "-claw", radius_start = 4, radius_end = 4 },
     { name = "right claw", joint = "right_claw", length = "-claw", radius_start = 4, radius_end = 4 },
 ]
-markers = [{ name = "Eye", joint = "shell", at = [30, 0, "height"] }]
+markers = [{ name = "Eye", joint = "shell", at = [30, "none", "height"] }]
 [dimensions]
 left_out = { mm = 60 }
 right_out = { mm = 50 }
@@ -128,6 +130,7 @@ def sized(factors: np.ndarray = FACTORS) -> BodyModel:
 def test_markers_joints_and_tips_are_landmarks() -> None:
     assert landmark_names(BODY) == (
         "Eye",
+        "stand",
         "shell",
         "left_arm",
         "left_claw",
@@ -156,6 +159,8 @@ def test_a_tree_knows_which_sizes_and_parameters_its_landmarks_show() -> None:
     few = FilmedTree(BODY, ("Eye", "left_claw"))
     assert few.groups == (("left_out",), ("left_length",), ("height",))
     assert few.free.tolist() == [0, 1, 2, 3, 4, 5, 6]
+    fixed = load_body("planar_arm4")
+    assert not FilmedTree(fixed, landmark_names(fixed)[-2:]).rooted.any()
     pairs, lengths = TREE.rigid_pairs
     named = {(NAMES[one], NAMES[two]): length for (one, two), length in zip(pairs, lengths, strict=True)}
     assert named == {
