@@ -13,6 +13,8 @@ from studio.body.film_fit import (
     FilmedTree,
     FrameClicks,
     _Problem,
+    _spread,
+    _turned,
     first_poses,
     fit_film,
     fit_poses,
@@ -296,6 +298,58 @@ def test_poses_near_points_in_space_are_taken_whichever_way_they_face() -> None:
     for pose, clicks in zip(found, frames, strict=True):
         seen = np.isfinite(clicks.points).all(axis=1)
         assert np.linalg.norm(marker_points(body, pose)[0][seen] - clicks.points[seen], axis=1).max() < 3.0
+
+
+def test_eight_headings_are_tried_within_limits() -> None:
+    pose = poses_of(1)[0]
+    for turn in range(8):
+        wanted = pose + turn * math.pi / 4.0 * (np.arange(11) == 3)
+        np.testing.assert_allclose(_turned(TREE, BODY, pose, turn), wanted)
+
+
+@pytest.mark.parametrize(("beyond", "found"), [(20.0, 100.0), (45.0, 110.0)])
+def test_an_angle_may_lie_thirty_degrees_beyond_its_guessed_limits(beyond: float, found: float) -> None:
+    poses = poses_of(2)
+    poses[:, 6] = np.radians(80.0 + beyond)
+    sought = problem(clicked(TREE.sized(1.3, {}), poses), is_sized=False)
+    sought.base = TREE.sized(1.3, {})
+    begin = np.clip(poses, BODY.lower, BODY.upper)
+    fitted = sought.solved(np.ones(0), begin)[1]
+    np.testing.assert_allclose(np.degrees(fitted[:, 6]), found, atol=1.5)
+
+
+def test_a_frame_begins_at_the_last_ones_pose_as_well() -> None:
+    """From points that leave the arms open, which keep near their rest; the root is that of the points."""
+    poses = np.repeat(poses_of(1, seed=4), 2, axis=0)
+    body = TREE.sized(1.0, {})
+    frames = clicked(body, poses)
+    for clicks in frames:
+        clicks.points[4:] = np.nan
+    found = first_poses(TREE, body, frames)
+    np.testing.assert_allclose(found[:, :6], poses[:, :6], atol=0.05)
+    np.testing.assert_allclose(found[:, 6:], np.tile(BODY.neutral[6:], (2, 1)), atol=0.02)
+
+
+def test_a_template_of_another_size_is_measured_again_by_what_was_told() -> None:
+    """Landmarks of which no distance stays say little at first; the told sizes give the scale of the rest."""
+    truth = TREE.sized(1.0, TREE.factors_by_name(np.full(4, 1.5)))
+    names = ("left_claw", "right_claw", "left claw tip", "right claw tip")
+    tree = FilmedTree(BODY, names)
+    assert tree.groups == (("left_out", "right_out"), ("left_length", "right_length"), ("claw",))
+    fit = fit_film(tree, CAMERAS, clicked(truth, poses_of(6), names))
+    assert fit.scale == pytest.approx(1.5, rel=0.06)
+    np.testing.assert_allclose(fit.values, 1.5 * np.array([55.0, 80.0, 35.0]), rtol=0.03)
+
+
+def test_the_spread_of_points_is_beside_that_of_the_same_points_at_rest() -> None:
+    rest = np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0]])
+    seen = 2.5 * rest + 7.0
+    assert _spread(seen, rest) == pytest.approx(2.5)
+    seen[1] = np.nan
+    assert _spread(seen, rest) == pytest.approx(2.5)
+    seen[2] = np.nan
+    assert math.isnan(_spread(seen, rest))
+    assert math.isnan(_spread(rest, np.zeros((3, 3))))
 
 
 def test_poses_of_a_body_of_known_sizes() -> None:
