@@ -615,6 +615,15 @@ def test_a_mesh_beside_the_file_is_found(tmp_path: Path) -> None:
     mesh = next(one for one in body.meshes if body.joints[one.joint].name == "right_finger")
     assert sorted(np.ptp(mesh.points, axis=0)) == pytest.approx([100.0, 100.0, 400.0], abs=1e-3)
     assert len(mesh.triangles) == 12
+    np.testing.assert_allclose(
+        0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0)), [50.0, 50.0, 250.0], atol=1e-3
+    )
+    # A cylinder of 100 mm, in the middle of which the link's origin is 50 mm down its own turned frame.
+    cylinder = next(one for one in body.meshes if body.joints[one.joint].name == "base_link")
+    along = Rotation.from_euler("xyz", [0.2, 0.1, 0.0]).as_matrix()[:, 2]
+    np.testing.assert_allclose(
+        cylinder.points[-2:], [[0, 0, 50] - 50 * along, [0, 0, 50] + 50 * along], atol=1e-3
+    )
     assert {body.joints[one.joint].name for one in body.meshes} >= {
         "base-link".replace("-", "_"),
         "right_finger",

@@ -36,6 +36,7 @@ def test_up_is_where_heads_are_above_feet(axis: str) -> None:
     named = turned_up(Path("a.trc"), motion, axis, usual="y")
     np.testing.assert_array_equal(named.positions, turned.positions)
     assert named.notes == ("read",)
+    assert up_of_markers(NAMES, along(axis, person() / 2000.0)) == axis
     with pytest.raises(TruthError, match="no axis"):
         turned_up(Path("a.trc"), motion, "up", usual="y")
 

@@ -169,7 +169,7 @@ def test_what_sleap_may_lack_or_have_too_much_of(tmp_path: Path) -> None:
     )
     refused(stored(tmp_path / "e.h5", tracks=tracks, node_names=names_of("nose")), "pixels or several bodies")
     with h5py.File(tmp_path / "f.h5", "w") as file:
-        file.create_dataset("tracks", (1, 3, 100, 600_000), "f8", chunks=(1, 3, 100, 100))
+        file.create_dataset("tracks", (1, 3, 100, 600_000), "f4", chunks=(1, 3, 100, 100))
         file["node_names"] = names_of(*NAMES)
     refused(tmp_path / "f.h5", "'tracks' has")
 
