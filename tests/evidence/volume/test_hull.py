@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from studio.evidence.volume.hull import Hull
-from studio.evidence.volume.hull_pieces import chosen_voxels, piece_numbers
+from studio.evidence.volume.hull_pieces import chosen_voxels, fill_cubes, labels_of, piece_numbers
 from studio.evidence.volume.tracking_space import Box
 
 BOX = Box(np.array([-800.0, -800.0, 0.0]), np.array([800.0, 800.0, 1600.0]))
@@ -59,3 +60,26 @@ def test_pieces_are_numbered_by_volume_and_corners_join() -> None:
     np.testing.assert_array_equal(kept.centres, hull.centres[[1, 2]])
     assert kept.colours.shape == (2, 3)
     assert kept.view_colours.shape == (2, 2, 3)
+
+
+def test_pieces_of_cells_are_those_that_scipy_finds_in_the_order_of_their_first_cells() -> None:
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        filled = np.zeros((9, 8, 12), np.bool_)
+        filled[1:-1, 1:-1, 1:-1] = rng.random((7, 6, 10)) < rng.choice([0.05, 0.12, 0.3])
+        expected, count = ndimage.label(filled, np.ones((3, 3, 3)))
+        labels = labels_of(filled)
+        assert labels.max() == count
+        firsts = [np.flatnonzero(labels == number)[0] for number in range(1, count + 1)]
+        assert firsts == sorted(firsts)
+        for number in range(1, count + 1):
+            assert len(np.unique(expected[labels == number])) == 1
+        np.testing.assert_array_equal(labels > 0, filled)
+
+
+def test_cubes_fill_their_own_cells() -> None:
+    filled = np.zeros((9, 9, 9), np.bool_)
+    fill_cubes(np.array([[1, 2, 3], [5, 5, 6]]), np.array([3, 1]), filled)
+    expected = np.zeros_like(filled)
+    expected[1:4, 2:5, 3:6] = expected[5, 5, 6] = True
+    np.testing.assert_array_equal(filled, expected)

@@ -12,8 +12,16 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.volume import hull_kernels as kernels
 from studio.evidence.volume import reconstruction
 from studio.evidence.volume.hull import Hull
+from studio.evidence.volume.hull_octree import first_look
 from studio.evidence.volume.hull_settings import HullSettings
-from studio.evidence.volume.reconstruction import Reconstructor, grid_within, reconstruct
+from studio.evidence.volume.reconstruction import (
+    Reconstructor,
+    check_views,
+    grid_limits,
+    grid_within,
+    radical_inverses,
+    reconstruct,
+)
 from studio.evidence.volume.tracking_space import Box, box_of
 from studio.evidence.yuv_background import learn_background
 from studio.foundations.errors import FootageError
@@ -218,3 +226,61 @@ def test_evidence_that_does_not_fit_is_refused(scene: Scene) -> None:
         reconstruct(scene.masks, (wrong, *scene.cameras[1:]), scene.box)
     with pytest.raises(FootageError, match="from 0 cameras"):
         Reconstructor((), scene.box, HullSettings())
+
+
+def test_a_grid_reaches_over_the_box() -> None:
+    """Of a cube of 1600 mm about the middle of the floor, sixteen voxels a side at depth 4."""
+    box = Box(np.array([-450.0, 100.0, 0.0]), np.array([450.0, 900.0, 1600.0]))
+    assert grid_limits(box, 4).tolist() == [[3, 4, 0], [12, 11, 15]]
+    assert grid_limits(box, 5).tolist() == [[7, 8, 0], [24, 23, 31]]
+    assert grid_limits(Box(box.lower, box.upper + 1e-9), 4).tolist() == [[3, 4, 0], [12, 11, 15]]
+    cells = [(x, y, z) for x in range(3, 13) for y in range(4, 12) for z in range(16)]
+    assert grid_within(box, 4).tolist() == [list(cell) for cell in cells]
+
+
+def test_radical_inverses_mirror_the_binary_digits() -> None:
+    assert radical_inverses(9).tolist() == [0.0, 0.5, 0.25, 0.75, 0.125, 0.625, 0.375, 0.875, 0.0625]
+
+
+def test_the_shape_of_masks_is_their_hull_without_colours(scene: Scene) -> None:
+    reconstructor = Reconstructor(scene.cameras, scene.box, HullSettings(hull_depth=6))
+    masks = [view.mask for view in scene.masks.views]
+    shape, hull = reconstructor.shape(masks), reconstructor.hull(scene.masks)
+    np.testing.assert_array_equal(shape.centres, hull.centres)
+    np.testing.assert_array_equal(shape.edges, hull.edges)
+    assert shape.colours.shape == hull.colours.shape
+    assert shape.view_colours.shape == hull.view_colours.shape
+    assert np.isnan(shape.colours).all()
+    assert np.isnan(shape.view_colours).all()
+    assert (shape.depth, shape.box) == (6, scene.box)
+    with pytest.raises(FootageError, match="4 masks for 5 cameras"):
+        reconstructor.shape(masks[:4])
+    with pytest.raises(FootageError, match="ring1"):
+        reconstructor.shape([masks[0], masks[1][:-1], *masks[2:]])
+
+
+def test_a_hull_is_carved_from_32_cameras_at_most(scene: Scene) -> None:
+    check_views([scene.cameras[0]])
+    check_views([scene.cameras[0]] * 32)
+    for count in (0, 33):
+        with pytest.raises(FootageError, match=f"from {count} cameras"):
+            check_views([scene.cameras[0]] * count)
+
+
+def test_the_first_depth_has_the_voxels_that_enough_views_see(scene: Scene) -> None:
+    for least in (1, 4, 5, 9):
+        reconstructor = Reconstructor(scene.cameras, scene.box, HullSettings(hull_least_views=least))
+        edge = scene.box.edge / 16.0
+        nodes = grid_within(scene.box, 4)
+        states, samples = np.zeros((len(nodes), 3), np.uint32), np.zeros(len(nodes), np.int64)
+        first_look(nodes, scene.box.corner, edge, reconstructor._table, 1.0, states, samples)
+        seeing = np.array([5 - sum(int(bits) >> view & 1 for view in range(5)) for bits in states[:, 1]])
+        kept = seeing >= min(least, 5)
+        np.testing.assert_array_equal(reconstructor._first, nodes[kept])
+        np.testing.assert_array_equal(reconstructor._first_states, states[kept])
+        assert len(reconstructor._heights) == samples.max()
+        assert reconstructor._rules.least_views == min(least, 5)
+    sizes = [
+        (camera.width * camera.height, (camera.width + 1) * (camera.height + 1)) for camera in scene.cameras
+    ]
+    assert reconstructor._starts.tolist() == np.cumsum([(0, 0), *sizes], axis=0).T.tolist()
