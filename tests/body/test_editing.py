@@ -275,6 +275,14 @@ def test_an_angle_a_quarter_turn_apart_stays_a_quarter_apart() -> None:
     assert limits_of(change.body, "right_open") == (30.0, 90.0, 78.0)
 
 
+@pytest.mark.parametrize("side", SIDES)
+def test_a_rest_value_that_is_a_sum_on_one_side_alone_stays(side: str) -> None:
+    head, end = PINCERS.split('name = "right_out"')
+    body = parse_body(head + 'name = "right_out"' + end.replace('[2, "gap"]', "4", 1), "p", "p.toml")
+    left, right = edited(body, mirror=side).body.parameters[1::2]
+    assert (left.neutral, right.neutral) == (3.0, 4.0)
+
+
 def test_a_marker_of_one_side_alone_is_added_to_the_other() -> None:
     text = PINCERS.replace('    { name = "Jaw_R", joint = "right_jaw", at = [1, -2, 3] },\n', "")
     change = edited(parse_body(text, "p", "p.toml"), mirror="left")

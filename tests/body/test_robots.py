@@ -589,9 +589,11 @@ def test_a_blocks_cone_has_its_area_everywhere() -> None:
 def test_a_mesh_that_grows_along_its_axis_has_a_cone_that_does() -> None:
     part = fitted_cone(corners(1.0, 2.0, 20.0, 20.0, 300.0))
     assert part.radii == pytest.approx(np.array([1.0, 2.0]) * 20.0 / np.sqrt(np.pi), rel=0.03)
-    pointed = fitted_cone(corners(1e-3, 1.0, 20.0, 20.0, 300.0))
-    assert pointed.radii[0] >= 0.05 * pointed.radii[1] * (1.0 - 1e-9)
-    assert pointed.radii[0] < 0.1 * pointed.radii[1]
+    angles = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    base = np.column_stack([30.0 * np.cos(angles), 30.0 * np.sin(angles), np.full(60, 300.0)])
+    pointed = fitted_cone(np.vstack([base, np.zeros((1, 3))]))
+    assert pointed.radii == pytest.approx([1.5, 30.0], rel=0.01)
+    assert pointed.radii[0] == pytest.approx(0.05 * pointed.radii[1])
 
 
 @pytest.mark.parametrize(
