@@ -12,11 +12,11 @@ from studio.body.motion_files.c3d import read_c3d, read_c3d_points, write_c3d
 from studio.body.motion_files.trc import MarkerMotion
 from studio.foundations.errors import StudioError
 
-NAMES = ("Head", "LAnkle", "RAnkle")
+NAMES = ("Head", "LAnkle", "RAnkle", "Hip", "Toe")
 
 
 def motion(unit: str = "mm", rate: float = 50.0) -> MarkerMotion:
-    places = np.random.default_rng(3).uniform(10.0, 900.0, (4, 3, 3)).astype(np.float32).astype(np.float64)
+    places = np.random.default_rng(3).uniform(10.0, 900.0, (4, 5, 3)).astype(np.float32).astype(np.float64)
     places[2, 1] = np.nan
     return MarkerMotion(NAMES, np.arange(4) / rate, places, unit=unit, rate=rate)
 
