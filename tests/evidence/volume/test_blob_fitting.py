@@ -221,6 +221,9 @@ def test_blobs_are_at_least_as_thick_in_every_direction() -> None:
         [100, 90, 0, 100, 0, 100],
         [10, 0, 5, 90, 0, 60],
         [100, 90, 0, 100, 0, 10],
+        [60, 25, -20, 50, 30, 80],
+        [45, -18, 12, 50, 9, 40],
+        [40, 9, 15, 38, 12, 42],
     )
     state = np.zeros((len(upper), 16))
     state[:, 3:9] = upper
