@@ -137,6 +137,11 @@ def test_a_joint_is_rewritten_with_the_hinge_that_hangs_on_it(over: bool, turned
     if turned:
         other[[0, 3]] = -pose[0], other[3] + HALF_TURN
     np.testing.assert_allclose(within_limits(body, other), pose, atol=1e-11)
+    # So it is wherever the joint's angles stand in the pose.
+    first = next(line for line in SWING.splitlines() if '"d", kind' in line)
+    last = SWING.replace(f"{first}\n", "").replace("\n]\njoints", f"\n{first}\n]\njoints")
+    found = within_limits(parse_body(last, "last", "last.toml"), np.roll(other, -1))
+    np.testing.assert_allclose(found, np.roll(pose, -1), atol=1e-11)
     # A flat rod shows which way it was turned about itself, but half a turn.
     flat = SWING.replace("radius_end = 9 }]", "radius_end = 9, scale_x = 0.5 }]")
     np.testing.assert_allclose(within_limits(parse_body(flat, "f", "f.toml"), other), pose, atol=1e-11)
