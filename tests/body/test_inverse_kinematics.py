@@ -5,6 +5,7 @@ from scipy.optimize import least_squares
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.inverse_kinematics import _MarkerProblem, known_markers, pose_from_markers
+from studio.body.least_squares import strictly_inside
 from studio.body.model import BodyModel
 from studio.foundations.errors import BodyError
 
@@ -187,6 +188,13 @@ def test_whole_turns_are_taken_back_where_limits_allow() -> None:
     np.testing.assert_array_equal(problem.unwound(pose), pose)
     problem.lower, problem.upper = problem.start - 100.0, problem.start - 0.5
     np.testing.assert_array_equal(problem.unwound(pose), pose)
+
+
+def test_a_start_lies_strictly_inside_its_limits() -> None:
+    lower, upper = np.array([0.0, 0.0, 0.0, -np.inf]), np.array([2.0, 2.0, 2.0, 5.0])
+    inside = strictly_inside(np.array([-1.0, 3.0, 1.0, 5.0]), lower, upper)
+    np.testing.assert_allclose(inside, [0.0, 2.0, 1.0, 5.0], atol=1e-8)
+    assert ((inside > lower) & (inside < upper)).all()
 
 
 def test_the_markers_that_a_body_knows() -> None:

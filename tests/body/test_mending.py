@@ -225,7 +225,7 @@ def test_hands_in_the_floor_are_lifted_just_out_of_it() -> None:
     motion = standing()
     fingers = joint_points(motion)["left_fingers"][0, 2]
     low = changed(motion, root=motion.root - np.array([0.0, 0.0, fingers + 60.0]))
-    turn = np.tile(Rotation.from_euler("zy", [40.0, -50.0], degrees=True).as_matrix(), (60, 1, 1))
+    turn = np.tile(Rotation.from_euler("ZY", [40.0, -50.0], degrees=True).as_matrix(), (60, 1, 1))
     low = changed(low, **{f"right_{part}": turn for part in ("upper_arm", "forearm", "hand")})
     low = changed(low, root=low.root - np.array([0.0, 0.0, 500.0]))
     lifted = with_hands_above_floor(low)
