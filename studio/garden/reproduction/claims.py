@@ -104,7 +104,8 @@ def of_enough_seeds(number: Number) -> Number:
 
 def beyond(number: Number, bound: float, side: str) -> Number:
     """The number with the verdict on the claim that it is lower (or higher) than a bound: reproduced where the whole
-    interval is, not reproduced where none of it is by more than the margin of equality, else undecided.
+    interval is, by FEWEST_SEEDS seeds or more, not reproduced where none of it is by more than the margin of equality,
+    else undecided.
     """
     lower_end, upper_end = equal_to(bound)
     end = f"above {lower_end:.3g}" if side == LOWER else f"below {upper_end:.3g}"
@@ -113,7 +114,8 @@ def beyond(number: Number, bound: float, side: str) -> Number:
         return replace(number, better=side, verdict="not reproduced", refuted=refuted)
     shown = number.high < bound if side == LOWER else number.low > bound
     denied = number.low >= lower_end if side == LOWER else number.high <= upper_end
-    verdict = "reproduced" if shown else "not reproduced" if denied else "undecided"
+    enough = number.seeds >= FEWEST_SEEDS
+    verdict = "reproduced" if shown and enough else "not reproduced" if denied else "undecided"
     return replace(number, better=side, verdict=verdict, refuted=refuted)
 
 

@@ -423,9 +423,11 @@ def test_ratios_and_root_mean_squares() -> None:
     assert run.angle_rms == pytest.approx(np.sqrt(np.mean(np.square(run.angle_deg))))
     assert run.limb_rms == pytest.approx(run.angle_rms)
     assert run.position_rms == pytest.approx(np.sqrt(np.mean(np.square(run.position_mm))))
-    halves = comparing.ratio("half", [followed(5.0, 1)], [followed(10.0, 1)], "lower")
+    small, large = ([followed(degrees, seed) for seed in range(5)] for degrees in (5.0, 10.0))
+    halves = comparing.ratio("half", small, large, "lower")
     assert halves.ours == pytest.approx(0.5, rel=0.01)
     assert halves.verdict == "reproduced"
+    assert comparing.ratio("half", small[1:], large[1:], "lower").verdict == "undecided"
     assert comparing.ratio("none", [run], [run], "").verdict == "answered"
     assert dynamics.FEW.changes["model_free_share"] == 0.0
 
