@@ -17,6 +17,7 @@ from studio.foundations.foreign_files import foreign_file, read_foreign_text
 from studio.foundations.words import sentence
 from studio.sessions.atomic_files import write_text
 from studio.sessions.session import Session
+from studio.sessions.stroke_files import missing_view, sources_by_name
 from studio.sessions.work_under_way import one_at_a_time
 
 LANDMARKS_NAME = "landmarks.csv"
@@ -53,7 +54,7 @@ def stored_clicks(session: Session) -> tuple[LandmarkClick, ...]:
     path = session.path / LANDMARKS_NAME
     if not path.exists():
         return ()
-    sources, count = _sources(session), session.manifest.frame_count
+    sources, count = sources_by_name(session), session.manifest.frame_count
     return tuple(one for one in _read(path) if not _misfit(one, sources, count))
 
 
@@ -97,7 +98,7 @@ def _click(path: Path, row: Sequence[str], width: int, places: Sequence[int]) ->
 def _check(session: Session, clicks: Sequence[LandmarkClick], where: str) -> None:
     if len(clicks) > MOST_CLICKS:
         raise FootageError(f"{where}{len(clicks)} clicks are too many.", f"Give {MOST_CLICKS} at most.")
-    sources, count = _sources(session), session.manifest.frame_count
+    sources, count = sources_by_name(session), session.manifest.frame_count
     places = set[tuple[int, str, str]]()
     for click in clicks:
         place = (click.frame, click.camera, click.landmark)
@@ -111,17 +112,11 @@ def _check(session: Session, clicks: Sequence[LandmarkClick], where: str) -> Non
         places.add(place)
 
 
-def _sources(session: Session) -> dict[str, CameraSource]:
-    return {source.name: source for source in session.manifest.footage.cameras}
-
-
 def _misfit(click: LandmarkClick, sources: Mapping[str, CameraSource], count: int) -> str:
     """Why a click does not fit the footage, "" if it does. count : of frames."""
-    source = sources.get(click.camera)
-    if source is None:
-        return f"there is no camera '{click.camera[:64]}'; the session has {', '.join(sources)}"
-    if not 0 <= click.frame < count:
-        return f"there is no frame {click.frame}; the footage has frames 0 to {count - 1}"
+    if missing := missing_view(click.camera, click.frame, sources, count):
+        return missing
+    source = sources[click.camera]
     if not click.landmark:
         return f"a click in {click.camera}, frame {click.frame}, names no landmark"
     beside = BESIDE * max(source.width, source.height)

@@ -76,7 +76,7 @@ def read_strokes(session: Session) -> tuple[Stroke, ...]:
     """The session's strokes, without those that its footage has no camera, frame or place for any more since it was
     changed. Raises SessionError.
     """
-    sources, count = _sources(session), session.manifest.frame_count
+    sources, count = sources_by_name(session), session.manifest.frame_count
     return tuple(one for one in stored_strokes(session) if not _misfit(one, sources, count))
 
 
@@ -116,23 +116,31 @@ def check_strokes(session: Session, strokes: Sequence[Stroke], where: str = "") 
     """Raises FootageError for strokes that do not fit the session's footage. where : begins the message."""
     if len(strokes) > MOST_STROKES:
         raise FootageError(f"{where}{len(strokes)} strokes are too many.", f"Paint {MOST_STROKES} at most.")
-    sources, count = _sources(session), session.manifest.frame_count
+    sources, count = sources_by_name(session), session.manifest.frame_count
     for number, stroke in enumerate(strokes, 1):
         if wrong := _misfit(stroke, sources, count):
             raise FootageError(f"{where}stroke {number} cannot be: {wrong}.", FORMAT)
 
 
-def _sources(session: Session) -> dict[str, CameraSource]:
+def sources_by_name(session: Session) -> dict[str, CameraSource]:
+    """The session's cameras by name."""
     return {source.name: source for source in session.manifest.footage.cameras}
+
+
+def missing_view(camera: str, frame: int, sources: Mapping[str, CameraSource], count: int) -> str:
+    """What the footage lacks of a camera's view of a frame, "" if it has it. count : of frames."""
+    if camera not in sources:
+        return f"there is no camera '{camera[:64]}'; the session has {', '.join(sources)}"
+    if not 0 <= frame < count:
+        return f"there is no frame {frame}; the footage has frames 0 to {count - 1}"
+    return ""
 
 
 def _misfit(stroke: Stroke, sources: Mapping[str, CameraSource], count: int) -> str:
     """Why a stroke does not fit the footage, "" if it does. count : of frames."""
-    source = sources.get(stroke.camera)
-    if source is None:
-        return f"there is no camera '{stroke.camera[:64]}'; the session has {', '.join(sources)}"
-    if not 0 <= stroke.frame < count:
-        return f"there is no frame {stroke.frame}; the footage has frames 0 to {count - 1}"
+    if missing := missing_view(stroke.camera, stroke.frame, sources, count):
+        return missing
+    source = sources[stroke.camera]
     if not 1.0 <= stroke.width <= WIDEST:
         return f"a brush is 1 to {WIDEST:.0f} pixels wide, not {stroke.width:g}"
     if not 1 <= len(stroke.points) <= MOST_POINTS:
