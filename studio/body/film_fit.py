@@ -3,7 +3,7 @@
 Places of landmarks are linear in the tree's dimensions, so a body a dimension gives their exact slopes. Unknown are one
 factor a dimension (left and right together), and each frame's pose; known are the pixels. Where these say nothing, a
 dimension keeps its share of the whole body and an angle its rest value: weak pulls (`SIZE_SPREAD`, `ANGLE_SPREAD`)
-whose share of the answer says how much was told.
+whose share of the answer says how much the clicks decided.
 """
 
 import math
@@ -41,14 +41,14 @@ BEYOND = math.radians(30.0)
 TIP = " tip"
 SHRUNK, GROWN = 0.05, 20.0
 """Factors between which a dimension may change."""
-TOLD = 0.8
-"""Share of a size that the clicks decided, from which it counts as told."""
+DECIDED = 0.8
+"""Share of a size that the clicks decided, from which it counts as decided by them."""
 USUAL_NOISE, LEAST_NOISE, NOISIER = 2.0, 0.5, 1.5
 """Pixels, standard deviation of a click, as expected and at least; the factor by which it may be another one."""
 ALIKE = 0.05
-"""Share by which the body's scale may differ from that of the sizes told."""
-TOLD_ANGLE = 0.2
-"""Share of an angle's spread below which its value is told."""
+"""Share by which the body's scale may differ from that of the sizes decided."""
+DECIDED_ANGLE = 0.2
+"""Share of an angle's spread below which the clicks decided its value."""
 FRAMES_LOOKED_AT = 3
 FAINT = 1e-9
 """Keeps what nothing tells from being singular."""
@@ -78,7 +78,7 @@ class FilmFit:
     off : a frame's (N, 2) pixels from clicks to landmarks.
     scale : of the whole body beside the template.
     values : (G,) of the groups of dimensions, mm; deviations : (G,) their standard deviations, mm, by the clicks'
-        scatter alone; told : (G,) 0 to 1, the share of the answer that the clicks decided.
+        scatter alone; decided : (G,) 0 to 1, the share of the answer that the clicks decided.
     turns : (D,) which parameters' values the clicks decided.
     noise : standard deviation of a click, pixels.
     """
@@ -89,7 +89,7 @@ class FilmFit:
     scale: float
     values: Array
     deviations: Array
-    told: Array
+    decided: Array
     turns: Mask
     noise: float
 
@@ -112,7 +112,7 @@ def _landmark_entries(body: BodyModel) -> dict[str, MarkerEntry]:
 
 
 class FilmedTree:
-    """A body whose sizes are sought.
+    """A body whose sizes are fitted.
 
     names : of the landmarks. groups : dimensions with one factor, each moves some landmark. free : (P,) parameters that
     move a landmark; the others keep their rest values. rooted : (P,) which of these move the whole body.
@@ -247,10 +247,10 @@ def fit_film(
 
 
 def _rescaled(tree: FilmedTree, fit: FilmFit) -> float:
-    """The body's scale by the sizes that are told, beside that to which the others were pulled."""
-    told = fit.told >= TOLD
+    """The body's scale by the sizes that are decided, beside that to which the others were pulled."""
+    decided = fit.decided >= DECIDED
     template = np.array([np.mean([tree.lengths[name] for name in group]) for group in tree.groups])
-    return float(np.median((fit.values / template)[told])) / fit.scale if told.any() else 1.0
+    return float(np.median((fit.values / template)[decided])) / fit.scale if decided.any() else 1.0
 
 
 def fit_poses(
@@ -505,7 +505,7 @@ class _Problem:
         body = self.body_of(factors)
         count = len(self.groups)
         values = np.array([np.mean([body.dimensions[name] for name in group]) for group in self.groups])
-        # How well a few frames' angles are told stands for all.
+        # How well a few frames decide the angles stands for all.
         looked = self.columns[:: max(1, len(self.frames) // FRAMES_LOOKED_AT)]
         wanted = np.concatenate([np.arange(count), looked.ravel()])
         seen, pulled = self.seen_slopes(self.whole(factors, poses)), self.pulled_slopes()
@@ -515,12 +515,12 @@ class _Problem:
         spread: Array = scipy.sparse.linalg.splu(both.tocsc()).solve(chosen)[wanted, np.arange(len(wanted))]
         residuals = np.concatenate([one.ravel() for one in off]) / self.sigma
         noise = self.sigma * float(np.sqrt((residuals**2).sum() / max(1, len(residuals) - self.unknowns)))
-        told = np.clip(1.0 - spread[:count] / SIZE_SPREAD**2, 0.0, 1.0)
+        decided = np.clip(1.0 - spread[:count] / SIZE_SPREAD**2, 0.0, 1.0)
         own = noise / self.sigma * np.sqrt(np.maximum(spread[:count], 0.0))
         deviations = values / np.maximum(factors, SHRUNK) * own
         turns = np.zeros(len(self.base.parameters), dtype=np.bool_)
         angles = np.median(spread[count:].reshape(looked.shape), axis=0)
-        turns[self.tree.free] = angles < TOLD_ANGLE * ANGLE_SPREAD**2
+        turns[self.tree.free] = angles < DECIDED_ANGLE * ANGLE_SPREAD**2
         return FilmFit(
             body,
             poses,
@@ -528,7 +528,7 @@ class _Problem:
             self.scale,
             np.asarray(values, np.float64),
             deviations,
-            told,
+            decided,
             turns,
             noise,
         )

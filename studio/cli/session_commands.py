@@ -113,7 +113,7 @@ def body_from_film_command(call: Call) -> dict[str, object]:
     made: FilmedBody = call()
     lines = [
         f"{one.name:28} {one.before:8.1f} → {one.after:7.1f} mm "
-        + (f"± {one.deviation:.1f}" if one.told else "  not told by itself")
+        + (f"± {one.deviation:.1f}" if one.decided else "  not decided by itself")
         for one in made.sizes
     ]
     lines += [""] if made.limbs else []

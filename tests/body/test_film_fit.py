@@ -215,7 +215,7 @@ def test_exact_clicks_give_the_sizes_and_the_poses(scale: float) -> None:
     np.testing.assert_allclose(found, marker_points(FilmedTree(truth, NAMES).body, poses), atol=1.0)
     assert max(np.abs(one).max() for one in fit.off) < 0.7
     assert fit.noise < 0.3
-    assert (fit.told > 0.97).all()
+    assert (fit.decided > 0.97).all()
     assert fit.turns.all()
 
 
@@ -280,7 +280,7 @@ def test_what_was_told_follows_from_the_dense_normal_equations() -> None:
     off = np.concatenate([one.ravel() for one in fit.off])
     noise = np.sqrt((off**2).sum() / (len(off) - sought.unknowns))
     assert fit.noise == pytest.approx(noise)
-    np.testing.assert_allclose(fit.told, 1.0 - spread[:4] / 0.09, rtol=1e-6)
+    np.testing.assert_allclose(fit.decided, 1.0 - spread[:4] / 0.09, rtol=1e-6)
     np.testing.assert_allclose(fit.values, 1.3 * np.array([55.0, 80.0, 40.0, 35.0]))
     np.testing.assert_allclose(fit.deviations, fit.values * noise / 1.5 * np.sqrt(spread[:4]), rtol=1e-6)
     angles = np.median([spread[columns] for columns in sought.columns[::2]], axis=0)
@@ -330,8 +330,8 @@ def test_a_frame_begins_at_the_last_ones_pose_as_well() -> None:
     np.testing.assert_allclose(found[:, 6:], np.tile(BODY.neutral[6:], (2, 1)), atol=0.02)
 
 
-def test_a_template_of_another_size_is_measured_again_by_what_was_told() -> None:
-    """Landmarks of which no distance stays say little at first; the told sizes give the scale of the rest."""
+def test_a_template_of_another_size_is_measured_again_by_what_was_decided() -> None:
+    """Landmarks of which no distance stays say little at first; sizes that they decide give the scale of the rest."""
     truth = TREE.sized(1.0, TREE.factors_by_name(np.full(4, 1.5)))
     names = ("left_claw", "right_claw", "left claw tip", "right claw tip")
     tree = FilmedTree(BODY, names)
@@ -358,7 +358,7 @@ def test_poses_of_a_body_of_known_sizes() -> None:
     np.testing.assert_allclose(
         marker_points(fit.body, fit.poses), marker_points(FilmedTree(sized(), NAMES).body, poses), atol=1.0
     )
-    assert (len(fit.values), len(fit.told), fit.scale) == (0, 0, 1.0)
+    assert (len(fit.values), len(fit.decided), fit.scale) == (0, 0, 1.0)
 
 
 def test_a_frame_in_a_wrong_turn_is_begun_again_from_those_that_fit() -> None:

@@ -53,7 +53,7 @@ def test_the_command_says_what_it_measured_and_saves_the_body(clicks: Path, tmp_
     )
     told = answer_of("body-from-film arm --as long-arm --replace --landmarks", clicks)
     assert told["body"] == "long-arm"
-    assert {one["name"]: one["told"] for one in told["sizes"]}["link_2_length"] is True
+    assert {one["name"]: one["decided"] for one in told["sizes"]}["link_2_length"] is True
     assert studio.subject("arm", body="long-arm").dimensions["link_2_length"] == pytest.approx(400, rel=0.02)
 
 

@@ -38,10 +38,10 @@ def arm_clicks() -> list[LandmarkClick]:
 
 
 def lengths_off(made: FilmedBody, true: BodyModel) -> Array:
-    """Shares by which told lengths are off."""
-    told = [size for size in made.sizes if size.told and size.kind == "length"]
-    sizes = np.array([true.dimensions[size.dimensions[0]] for size in told])
-    return np.array([size.after for size in told]) / sizes - 1.0
+    """Shares by which decided lengths are off."""
+    decided = [size for size in made.sizes if size.decided and size.kind == "length"]
+    sizes = np.array([true.dimensions[size.dimensions[0]] for size in decided])
+    return np.array([size.after for size in decided]) / sizes - 1.0
 
 
 def test_an_arms_lengths_come_out_within_two_percent(arm: Session) -> None:
@@ -85,7 +85,7 @@ def test_what_was_not_clicked_keeps_the_templates_proportion_and_is_named(arm: S
     made = body_of_film(arm, ARM, clicks)
     scale = np.median([made.body.dimensions[name] / 250.0 for name in list(LINKS)[:3]])
     assert made.body.dimensions["link_4_length"] == pytest.approx(250.0 * scale, rel=0.05)
-    assert {size.name for size in made.sizes if size.told} == set(list(LINKS)[:3])
+    assert {size.name for size in made.sizes if size.decided} == set(list(LINKS)[:3])
 
 
 def test_limits_are_widened_where_a_pose_exceeds_them(arm: Session) -> None:
@@ -178,20 +178,20 @@ def test_a_mouses_lengths_and_what_its_masks_show_of_its_thickness(tmp_path: Pat
     assert len(off) > 18
     assert np.median(np.abs(off)) < 0.02
     assert np.abs(off).max() < 0.1
-    # The rump is two limbs on a line, whose ends nobody clicked: how it is parted is not told.
-    untold = {size.name for size in made.sizes if not size.told}
-    assert {"rump_length", "seat_length"} <= untold
-    assert len(untold) < 5
+    # The rump is two limbs on a line, whose ends nobody clicked: how it is parted is not decided.
+    undecided = {size.name for size in made.sizes if not size.decided}
+    assert {"rump_length", "seat_length"} <= undecided
+    assert len(undecided) < 5
     whole = {
         body: body.dimensions["rump_length"] + body.dimensions["seat_length"] for body in (made.body, true)
     }
     assert whole[made.body] == pytest.approx(whole[true], rel=0.1)
-    told = {
+    decided = {
         size.name: size.after / true.dimensions[size.name] for size in made.sizes if size.kind == "radius"
     }
-    print({name: round(share, 2) for name, share in told.items()})
+    print({name: round(share, 2) for name, share in decided.items()})
     for name in ("chest_radius_start", "head_radius_start", "tail_radius_start", "tail_2_radius_start"):
-        assert told[name] == pytest.approx(1.0, abs=0.1)
+        assert decided[name] == pytest.approx(1.0, abs=0.1)
     # Hidden by the trunk in every view, and named.
-    assert not [name for name in told if name.startswith("haunch")]
+    assert not [name for name in decided if name.startswith("haunch")]
     assert any("left haunch" in note and "the masks show no border" in note for note in made.notes)

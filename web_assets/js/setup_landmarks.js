@@ -180,7 +180,7 @@ function Making({ model }) {
 
 /** The body that was made. */
 function Made(/** @type {{ session: string, made: any }} */ { session, made }) {
-  const told = made.sizes.filter((one) => one.told);
+  const decided = made.sizes.filter((one) => one.decided);
   const query = new URLSearchParams({ session, body: made.saved });
   return html`
     <p>
@@ -192,7 +192,7 @@ function Made(/** @type {{ session: string, made: any }} */ { session, made }) {
     <${Table}
       kind="sizes"
       heads=${["Size (mm)", "before", "after", "±"]}
-      rows=${told.map((one) => [
+      rows=${decided.map((one) => [
         one.name.replaceAll("_", " "),
         one.before.toFixed(1),
         one.after.toFixed(1),

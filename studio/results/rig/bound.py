@@ -3,7 +3,7 @@
 A pose x is seen by where the outlines of its limbs are. A piece of outline tells one direction, that across it, and
 only where it is in the picture and no other limb covers it there. With J its slope over the pose, mm, and σ how far
 outlines are off, the pieces of a camera tell I = Σ JᵀJ / σ² (Fisher information), cameras add up, and the inverse of
-all that is told, with what is known of a body beforehand, bounds the covariance of x (Cramér & Rao; cameras are placed
+the sum of it, with what is known of a body beforehand, bounds the covariance of x (Cramér & Rao; cameras are placed
 by it in Olague & Mohr 2002, "Optimal camera placement for accurate reconstruction", Pattern Recognition 35(4)). It is
 no error in mm: what the likelihood gets wrong, and a search that is lost, are not in it. Rigs are compared by it.
 """
@@ -80,15 +80,15 @@ def linear_motion(body: BodyModel, poses: Array, count: int = POSES) -> LinearMo
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Told:
+class ViewInformation:
     """What a camera tells of a motion. information : (F, D, D). sees : share of the body in its picture."""
 
     information: Array
     sees: float
 
 
-def told_by(motion: LinearMotion, camera: Camera) -> Told:
-    """What a camera tells of a motion: its information of each pose."""
+def view_information(motion: LinearMotion, camera: Camera) -> ViewInformation:
+    """What a camera tells of each pose of a motion."""
     axis, slopes = _between(motion.ends, 2), _between(motion.end_slopes, 2)
     pixels, depth = project(camera, axis)
     ends, end_depth = project(camera, motion.ends)
@@ -103,7 +103,7 @@ def told_by(motion: LinearMotion, camera: Camera) -> Told:
         turned = _ACROSS[:, None] * across[:, :, None] + _AHEAD[:, None] * along[:, :, None]
         outline = pixels + half[..., None] * turned
         seen = _in_picture(camera, axis, depth, outline)
-        told = seen & ~_covered(outline, ends, motion.radii * _focal(camera) / end_depth)
+        uncovered = seen & ~_covered(outline, ends, motion.radii * _focal(camera) / end_depth)
         # Slope of the outline across itself, in mm where the limb is.
         ahead = np.stack(
             [(project(camera, axis + step)[0] - pixels) for step in np.eye(3)], axis=-1
@@ -111,10 +111,10 @@ def told_by(motion: LinearMotion, camera: Camera) -> Told:
         rows = np.einsum("flsp,flspi,flsid->flsd", normal, ahead, slopes) / per_mm[..., None]
         piece = np.where(_AHEAD == 0.0, length[..., None] / per_mm / _SIDES, half / per_mm)
         off = (OFF_PX / per_mm) ** 2 + (OFF_MM * motion.scale) ** 2
-        weight = np.where(told, piece / (ALIKE_MM * motion.scale) / off, 0.0)
-    rows, weight = np.where(told[..., None], rows, 0.0), np.nan_to_num(weight)
+        weight = np.where(uncovered, piece / (ALIKE_MM * motion.scale) / off, 0.0)
+    rows, weight = np.where(uncovered[..., None], rows, 0.0), np.nan_to_num(weight)
     rows = (rows * np.sqrt(weight)[..., None]).reshape(len(rows), -1, rows.shape[-1])
-    return Told(np.swapaxes(rows, 1, 2) @ rows, float(seen.mean()))
+    return ViewInformation(np.swapaxes(rows, 1, 2) @ rows, float(seen.mean()))
 
 
 def errors_of(motion: LinearMotion, information: Array) -> Array:
@@ -126,10 +126,10 @@ def errors_of(motion: LinearMotion, information: Array) -> Array:
     return np.sqrt(np.maximum(squares, 0.0)).mean(axis=-2)
 
 
-def total(told: Sequence[Told], motion: LinearMotion) -> Array:
+def total(views: Sequence[ViewInformation], motion: LinearMotion) -> Array:
     """(F, D, D) what cameras tell together."""
     frames, dimension = len(motion.ends), len(motion.known)
-    return sum((one.information for one in told), np.zeros((frames, dimension, dimension)))
+    return sum((one.information for one in views), np.zeros((frames, dimension, dimension)))
 
 
 def _between(ends: Array, axis: int) -> Array:

@@ -11,7 +11,7 @@ from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError
 from studio.foundations.geometry.camera import Camera
 from studio.results.drawing_footage.cameras import placed_camera
-from studio.results.rig.bound import LinearMotion, Told, errors_of, told_by, total
+from studio.results.rig.bound import LinearMotion, ViewInformation, errors_of, total, view_information
 from studio.results.uncertainty.twin import TwinCamera
 
 Place = tuple[float, float, float]
@@ -119,8 +119,8 @@ class Choice:
 
 def choose(
     motion: LinearMotion,
-    kept: Sequence[Told],
-    present: Sequence[Told],
+    kept: Sequence[ViewInformation],
+    present: Sequence[ViewInformation],
     candidates: Sequence[Camera],
     count: int,
     weigh: Weigh,
@@ -131,39 +131,39 @@ def choose(
 
     Raises RunError where too few see the subject.
     """
-    told: list[Told] = []
+    views: list[ViewInformation] = []
     for at, camera in enumerate(candidates):
         progress(at, len(candidates))
-        told.append(told_by(motion, camera))
-    usable = [at for at, one in enumerate(told) if one.sees >= SEEN]
+        views.append(view_information(motion, camera))
+    usable = [at for at, one in enumerate(views) if one.sees >= SEEN]
     if len(usable) < count:
         raise RunError(
-            f"Only {len(usable)} of {len(told)} places of the grid have half of the body in their picture.",
+            f"Only {len(usable)} of {len(views)} places of the grid have half of the body in their picture.",
             "Take a closer spacing, places that are farther away, or a lens that sees more.",
         )
 
     def least(base: Array, among: Sequence[int]) -> tuple[int, float]:
-        values = [float(weigh(errors_of(motion, base + told[at].information))) for at in among]
+        values = [float(weigh(errors_of(motion, base + views[at].information))) for at in among]
         best = int(np.argmin(values))
         return among[best], values[best]
 
     base, chosen, reached = total(kept, motion), list[int](), math.inf
     for number in range(count):
         progress(number, count)
-        at, reached = least(base + total([told[one] for one in chosen], motion), _others(usable, chosen))
+        at, reached = least(base + total([views[one] for one in chosen], motion), _others(usable, chosen))
         chosen.append(at)
     for _ in range(MOST_EXCHANGES if count > 1 else 0):
         before = tuple(chosen)
         for place in range(count):
             rest = [one for number, one in enumerate(chosen) if number != place]
-            at, value = least(base + total([told[one] for one in rest], motion), _others(usable, rest))
+            at, value = least(base + total([views[one] for one in rest], motion), _others(usable, rest))
             if value < reached - 1e-9:
                 chosen[place], reached = at, value
         if tuple(chosen) == before:
             break
     now = total(present, motion)
-    added = np.array([float(weigh(errors_of(motion, now + one.information))) for one in told])
-    return Choice(tuple(chosen), tuple(one.sees for one in told), added)
+    added = np.array([float(weigh(errors_of(motion, now + one.information))) for one in views])
+    return Choice(tuple(chosen), tuple(one.sees for one in views), added)
 
 
 def _others(usable: Sequence[int], chosen: Sequence[int]) -> list[int]:

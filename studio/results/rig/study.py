@@ -27,7 +27,14 @@ from studio.foundations.words import counted, enumerated
 from studio.results.inspection.reading import InspectedRun
 from studio.results.inspection.reference import body_points, limbs_of_points
 from studio.results.inspection.tables import Row, Table, table
-from studio.results.rig.bound import LinearMotion, Told, errors_of, linear_motion, told_by, total
+from studio.results.rig.bound import (
+    LinearMotion,
+    ViewInformation,
+    errors_of,
+    linear_motion,
+    total,
+    view_information,
+)
 from studio.results.rig.places import (
     Place,
     camera_at,
@@ -342,7 +349,9 @@ class _Asker:
         self._path: Array = body_points(run.body, poses).mean(axis=1)
         x, y, z = self._path.mean(axis=0).tolist()
         self.subject: Place = (x, y, z)
-        self._told: dict[str, Told] = {one.name: told_by(self._motion, one) for one in self.cameras}
+        self._views: dict[str, ViewInformation] = {
+            one.name: view_information(self._motion, one) for one in self.cameras
+        }
         names = [camera.name for camera in self.cameras]
         if request.lens and request.lens not in names:
             raise RunError(
@@ -409,7 +418,7 @@ class _Asker:
         places, spacing = grid_of(
             self.cameras, self._path, request.heights, request.spacing, self._motion.scale
         )
-        now = [*self._told.values()]
+        now = [*self._views.values()]
         chosen = choose(
             self._motion,
             [] if request.instead else now,
@@ -432,10 +441,12 @@ class _Asker:
 
     def bound(self, name: str, kind: str, rig: Sequence[TwinCamera]) -> RigErrors:
         """A rig of which nothing but the bound is known."""
-        told = [self._told.get(one.camera.name) or told_by(self._motion, one.camera) for one in rig]
+        views = [
+            self._views.get(one.camera.name) or view_information(self._motion, one.camera) for one in rig
+        ]
         own = {camera.name for camera in self.cameras}
         cameras = tuple(_described(one, is_new=one.camera.name not in own) for one in rig)
-        return RigErrors(name, kind, cameras, _numbers(errors_of(self._motion, total(told, self._motion))))
+        return RigErrors(name, kind, cameras, _numbers(errors_of(self._motion, total(views, self._motion))))
 
     def predicted(self, rig: RigErrors, present: RigErrors) -> RigErrors:
         """A rig with what follows from the present one's twin."""

@@ -2,7 +2,8 @@
 
 Each landmark is triangulated, and clicks that disagree are named and left out (`footage.calibration.landmark_points`);
 what agrees gives the tree's lengths and every frame's pose together (`body.film_fit`). Radii come from the session's
-masks in these frames (`film_radii.py`), limits from the angles seen. What was not told keeps the template's proportion.
+masks in these frames (`film_radii.py`), limits from the angles seen. What it does not decide keeps the
+template's proportion.
 """
 
 import math
@@ -17,7 +18,7 @@ from pydantic import Field
 
 from studio.body.dragging import root_joint
 from studio.body.editing import edited
-from studio.body.film_fit import TOLD, FilmedTree, FilmFit, FrameClicks, fit_film, fit_poses
+from studio.body.film_fit import DECIDED, FilmedTree, FilmFit, FrameClicks, fit_film, fit_poses
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.mirroring import Mirror, has_sides
 from studio.body.model import BodyModel
@@ -77,7 +78,7 @@ class FilmRequest:
 @dataclass(frozen=True, slots=True)
 class FilmedSize:
     """One size, mm. dimensions : that have it. before : in the template. deviation : standard deviation, of a radius
-    the scatter of its measurements. told : whether the film decided it; else it is drawn to the
+    the scatter of its measurements. decided : whether the film decided it; else it is drawn to the
     template's proportion.
     """
 
@@ -87,7 +88,7 @@ class FilmedSize:
     before: float
     after: float
     deviation: float
-    told: bool
+    decided: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,15 +206,17 @@ def body_of_film(
     radii = _radii(session, cameras, template, fit, chosen, request, notes)
     poses = fit.poses if check is None else np.concatenate([fit.poses, check.poses])
     limits = _limits(template, fit.turns, poses, notes) if request.limits else {}
-    if not any(size.told for size in sizes):
+    if not any(size.decided for size in sizes):
         raise BodyError(
             "The clicks tell no length of the body.",
             "Click both ends of a limb in the same frame, in two views.",
         )
     body = _body(template, fit.scale, [*sizes, *radii], limits, notes)
-    untold = [size.name for size in sizes if not size.told]
-    if untold:
-        notes.append(f"Not told one by one, and drawn to the template's proportion: {enumerated(untold)}.")
+    undecided = [size.name for size in sizes if not size.decided]
+    if undecided:
+        notes.append(
+            f"Not decided one by one, and drawn to the template's proportion: {enumerated(undecided)}."
+        )
     every = [*fit.off, *(check.off if check else ())]
     off, most = _off(fit)
     checked_off, checked_most = _off(check) if check else (None, None)
@@ -347,10 +350,10 @@ def _lengths(tree: FilmedTree, fit: FilmFit) -> list[FilmedSize]:
             float(np.mean([tree.lengths[name] for name in group])),
             float(value),
             float(deviation),
-            bool(told >= TOLD),
+            bool(decided >= DECIDED),
         )
-        for group, value, deviation, told in zip(
-            tree.groups, fit.values, fit.deviations, fit.told, strict=True
+        for group, value, deviation, decided in zip(
+            tree.groups, fit.values, fit.deviations, fit.decided, strict=True
         )
     ]
 
@@ -378,7 +381,7 @@ def _radii(
             f"Of {enumerated(hidden)} the masks show no border: their radii are scaled with the body."
         )
     return [
-        FilmedSize(name, "radius", (name,), template.dimensions[name], value, scatter, told=True)
+        FilmedSize(name, "radius", (name,), template.dimensions[name], value, scatter, decided=True)
         for name, (value, scatter) in measured.items()
     ]
 
@@ -416,7 +419,7 @@ def _masks(session: Session, frames: Sequence[int]) -> list[dict[str, Bytes]]:
 
 def _limits(template: BodyModel, turns: Mask, poses: Array, notes: list[str]) -> dict[str, float]:
     """Limits of bounded angles below the root, degrees, by the poses seen: widened, and narrowed where an angle moved
-    in many frames; a pair's angles alike. turns : (D,) which parameters the clicks told.
+    in many frames; a pair's angles alike. turns : (D,) which parameters the clicks decided.
     """
     root = root_joint(template)
     of_root = template.joints[root].parameters if root >= 0 else ()
@@ -492,7 +495,7 @@ def _same(template: BodyModel, limit: str, value: float) -> bool:
 def _kept(size: FilmedSize, body: BodyModel) -> FilmedSize:
     """The size as the body has it."""
     after = float(np.mean([body.dimensions[name] for name in size.dimensions]))
-    return FilmedSize(size.name, size.kind, size.dimensions, size.before, after, size.deviation, size.told)
+    return FilmedSize(size.name, size.kind, size.dimensions, size.before, after, size.deviation, size.decided)
 
 
 def _limbs(

@@ -2,7 +2,7 @@
 
 Each point of a silhouette's border belongs to the limb that reaches farthest there; from that limb's bone to the point
 is its radius at that place. Whose the points are, and the radii, are found in turns; a limb that forms no border, since
-others hide it in every view, is not told.
+others hide it in every view, is not measured.
 """
 
 from collections.abc import Mapping, Sequence
@@ -149,10 +149,10 @@ class _Radii:
             values = answer.x
         limb, place, reach = self.owners(views, values)
         off = np.abs(reach - self.along(values)[limb, place])
-        told = dict[str, tuple[float, float]]()
+        measured = dict[str, tuple[float, float]]()
         for name in self.names:
             at = self.place[name]
             near = self.ends[limb, (ALONG[place] >= 0.5).astype(np.int64)] == at
             if near.sum() >= FEWEST:
-                told[name] = float(values[at]), float(np.median(off[near]))
-        return told
+                measured[name] = float(values[at]), float(np.median(off[near]))
+        return measured

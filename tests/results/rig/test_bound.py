@@ -13,7 +13,7 @@ from planted_runs import person_poses
 from studio.body.catalogue import load_body
 from studio.foundations.errors import RunError
 from studio.foundations.geometry.camera import Camera
-from studio.results.rig.bound import LinearMotion, errors_of, linear_motion, told_by, total
+from studio.results.rig.bound import LinearMotion, errors_of, linear_motion, total, view_information
 from studio.results.rig.places import camera_at, choose, grid_of, parsed_place
 
 BODY = load_body("human31")
@@ -35,7 +35,7 @@ def around(degrees: float, distance: float = 3500.0) -> Camera:
 
 
 def errors_by(motion: LinearMotion, *cameras: Camera) -> np.ndarray:
-    return errors_of(motion, total([told_by(motion, one) for one in cameras], motion))
+    return errors_of(motion, total([view_information(motion, one) for one in cameras], motion))
 
 
 def test_slopes_are_those_of_the_body(motion: LinearMotion) -> None:
@@ -62,8 +62,8 @@ def test_a_joint_seen_side_by_side_gains_most_from_a_camera_at_right_angles(
 
 
 def test_one_camera_tells_least_along_its_view(motion: LinearMotion) -> None:
-    told = told_by(motion, around(0.0))
-    covariance = np.linalg.inv(told.information + np.diag(motion.known))
+    view = view_information(motion, around(0.0))
+    covariance = np.linalg.inv(view.information + np.diag(motion.known))
     slopes = motion.point_slopes[:, NAMES.index("Hip")]
     off = np.einsum("fid,fde,fje->fij", slopes, covariance, slopes).mean(axis=0)
     towards = np.array([3500.0, 0.0, 550.0]) / np.hypot(3500.0, 550.0)
@@ -77,8 +77,8 @@ def test_a_limb_that_one_camera_alone_has_in_its_picture_is_lost_with_it(motion:
         for one in PRESENT[:3]
     )
     whole = PRESENT[3]
-    assert told_by(motion, whole).sees == 1.0
-    assert all(told_by(motion, one).sees < 0.8 for one in legs_only)
+    assert view_information(motion, whole).sees == 1.0
+    assert all(view_information(motion, one).sees < 0.8 for one in legs_only)
     rigs = {
         left: [one for one in (*legs_only, whole) if one.name != left]
         for left in ("cam1", "cam2", "cam3", "cam4")
@@ -102,21 +102,22 @@ def test_a_limb_that_another_covers_tells_nothing_there() -> None:
         elbow = [at for at, entry in enumerate(BODY.parameters) if "elbow" in entry.name.lower()]
     assert elbow
     side = {
-        one: np.diagonal(told_by(standing, around(one)).information[0])[elbow].sum() for one in (0, 90, 270)
+        one: np.diagonal(view_information(standing, around(one)).information[0])[elbow].sum()
+        for one in (0, 90, 270)
     }
     # From the side of the other arm the trunk is in front of it; from the front both are seen.
     assert max(side.values()) == side[0]
 
 
 def test_farther_away_a_camera_tells_less(motion: LinearMotion) -> None:
-    near = told_by(motion, around(0.0)).information
+    near = view_information(motion, around(0.0)).information
     camera = around(0.0, 9000.0)
-    far = told_by(motion, camera).information
+    far = view_information(motion, camera).information
     assert np.trace(far.sum(axis=0)) < np.trace(near.sum(axis=0))
     behind = replace(camera, rotation=camera.rotation * [[-1], [1], [-1]])
     behind = replace(behind, translation=-behind.rotation @ camera.centre)
-    assert told_by(motion, behind).sees == 0.0
-    assert not told_by(motion, behind).information.any()
+    assert view_information(motion, behind).sees == 0.0
+    assert not view_information(motion, behind).information.any()
 
 
 def test_the_best_pair_is_nearly_that_of_all_pairs(motion: LinearMotion) -> None:
@@ -124,7 +125,7 @@ def test_the_best_pair_is_nearly_that_of_all_pairs(motion: LinearMotion) -> None
     chosen = choose(
         motion,
         [],
-        [told_by(motion, PRESENT[0])],
+        [view_information(motion, PRESENT[0])],
         candidates,
         2,
         lambda errors: errors.mean(axis=-1),
