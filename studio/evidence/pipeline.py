@@ -29,7 +29,7 @@ from studio.foundations.geometry.camera import Camera
 from studio.foundations.tracing import span
 
 KINDS: dict[str, FittedKind] = {"median": "median", "combined": "combined", "mog2": "mog2", "knn": "knn"}
-"""Models by the knob's value; all others are Gaussians."""
+"""Models by the knob's value, beside the Gaussian one."""
 KEPT_CELLS = 512
 """Pictures whose cells are kept: what asks for one camera after the other needs those of all."""
 _T = TypeVar("_T")
@@ -213,7 +213,9 @@ class EvidenceMaker:
         )
 
     def raw_mask(self, camera: str, frame: int, picture: Bytes) -> RawMask:
-        """The mask that came with the data, or the difference from a background model, before any clean-up."""
+        """Before any clean-up: the camera's mask file, given with the footage or made in set-up, else what brightness
+        and colour or the difference from a background model say.
+        """
         choice = self.settings.background_model
         given = self.footage.has_masks(camera)
         if choice == "mask" and not given:

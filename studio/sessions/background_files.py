@@ -4,6 +4,7 @@ background/…                 plates and clips; the manifest names the one in u
 exclusions/<camera>.png      white where nothing counts: a bystander, a monitor
 person_masks/<n>/<camera>/…  masks that the studio made of a person, a PNG a frame, as those that come with footage; the
                              manifest names those in use
+animal_masks/<n>/<camera>/…  those of an animal before known backgrounds
 stroke_masks/<n>/<camera>/…  those made of brush strokes (`stroke_files`)
 chosen_masks/<n>/<camera>/…  those of the source that suits each camera best
 subject_masks/<n>/<camera>/… those of one of several subjects in view; subject_masks/<n>/whole/<camera>/… those of all,
@@ -48,7 +49,7 @@ WHOLE = "whole"
 SCHEMA_VERSION = 2
 MASKS_GONE = (
     "The masks that the studio made were of the footage as it was before, and are gone: make them again with 'studio"
-    " background SESSION --source person' (or strokes, or best)."
+    " background SESSION --source person' (or animal, strokes, or best)."
 )
 
 Knob = bool | int | float | str

@@ -9,7 +9,7 @@ from pydantic import Field
 from studio.app.server.answers import Router, Shown
 from studio.app.server.app_state import App
 from studio.app.server.job_routes import add_job_routes
-from studio.app.server.run_routes import RUN, OpenRun
+from studio.app.server.run_routes import RUN, RunInPath
 from studio.app.server.schemas import Request
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.knobs import Value
@@ -70,7 +70,7 @@ def choices() -> ExportChoices:
 
 
 @router.get(RUN + "/exports")
-def exports(session: OpenSession, run: OpenRun, app: App) -> ExportList:
+def exports(session: OpenSession, run: RunInPath, app: App) -> ExportList:
     """The run's exports, newest first, and those under way."""
     going = [state for state in app.jobs.going(EXPORT, session.name) if state.run == run.name]
     of = exports_of(run)
@@ -78,7 +78,7 @@ def exports(session: OpenSession, run: OpenRun, app: App) -> ExportList:
 
 
 @router.post(RUN + "/exports", status_code=202)
-async def begin_export(session: OpenSession, run: OpenRun, request: ExportRequest, app: App) -> ExportState:
+async def begin_export(session: OpenSession, run: RunInPath, request: ExportRequest, app: App) -> ExportState:
     """Begin an export. 422 for an unknown format or option; ask for its state, or wait for `export` events."""
     form = requested_format(request.format, request.options)
 
@@ -93,7 +93,7 @@ add_job_routes(router, "/exports/{identifier}", EXPORT)
 
 
 @router.get(RUN + "/exports/{file}", response_class=FileResponse)
-def download(run: OpenRun, file: str) -> FileResponse:
+def download(run: RunInPath, file: str) -> FileResponse:
     """An export's file."""
     path = kept_file(run, file)
     form = FORMATS.get(path.suffix.removeprefix("."))
@@ -103,7 +103,7 @@ def download(run: OpenRun, file: str) -> FileResponse:
 
 
 @router.delete(RUN + "/exports/{file}", status_code=204)
-def delete(run: OpenRun, file: str) -> Response:
+def delete(run: RunInPath, file: str) -> Response:
     """Delete an export for good: it can be made again from the run."""
     discard_export(run, file)
     return Response(status_code=204)

@@ -8,7 +8,7 @@ from studio.app.server import files
 from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.run_routes import RUN, OpenRun
+from studio.app.server.run_routes import RUN, RunInPath
 from studio.foundations.csv_text import as_csv
 from studio.foundations.declaring import LARGEST
 from studio.operations.notes import NoteList
@@ -21,13 +21,13 @@ router = Router(prefix="/api", tags=["notes"])
 
 
 @router.get(RUN + "/notes")
-def notes(run: OpenRun) -> NoteList:
+def notes(run: RunInPath) -> NoteList:
     """The notes and bookmarks on its frames."""
     return NoteList(read(run))
 
 
 @router.get(RUN + "/notes.csv", response_class=Response)
-def notes_csv(run: OpenRun) -> Response:
+def notes_csv(run: RunInPath) -> Response:
     """The same as a table: frame, text, made."""
     rows = [[entry.frame, entry.text, entry.made] for entry in read(run)]
     name = f"{run.session_name}-{run.name}-notes.csv"
@@ -36,7 +36,7 @@ def notes_csv(run: OpenRun) -> Response:
 
 @router.put(RUN + "/frames/{frame}/note")
 def put_note(
-    run: OpenRun,
+    run: RunInPath,
     frame: int,
     arguments: Annotated[Arguments, body_of(write, "NoteRequest", only=("text",))],
     app: App,
@@ -46,7 +46,7 @@ def put_note(
 
 
 @router.delete(RUN + "/frames/{frame}/note")
-def delete_note(run: OpenRun, frame: Annotated[int, Path(le=LARGEST)], app: App) -> NoteList:
+def delete_note(run: RunInPath, frame: Annotated[int, Path(le=LARGEST)], app: App) -> NoteList:
     """Take a frame's note away."""
     return _published(app, run, write(run, frame, remove=True))
 

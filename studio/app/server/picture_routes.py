@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import APIRouter, Depends, Query, Response
 
 from studio.app.server import files
-from studio.app.server.run_routes import RUN, OpenRun
+from studio.app.server.run_routes import RUN, RunInPath
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.arrays import Array
 from studio.foundations.errors import SettingsError
@@ -82,7 +82,7 @@ class Drawn:
 @router.get(RUN + VIEW, response_class=Response)
 def overlay(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     frame: int,
     camera: str,
     drawn: Annotated[Drawn, Depends(Drawn)],

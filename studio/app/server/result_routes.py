@@ -10,7 +10,7 @@ from fastapi import Query, Response
 
 from studio.app.server import files
 from studio.app.server.answers import Router, shown_as
-from studio.app.server.run_routes import RUN, Checked, OpenRun
+from studio.app.server.run_routes import RUN, Checked, RunInPath
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.csv_text import as_csv
 from studio.foundations.csv_text import poses_csv as csv_of_poses
@@ -36,7 +36,7 @@ router = Router(prefix="/api", tags=["results"])
 @router.get(RUN + "/frames")
 def frames(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     track: Annotated[str, Query(max_length=64, description="Whose poses the errors are of.")] = RAW,
     check: Checked = True,
 ) -> FramesSummary:
@@ -45,19 +45,19 @@ def frames(
 
 
 @router.get(RUN + "/live")
-def live_figures(run: OpenRun) -> LiveView:
+def live_figures(run: RunInPath) -> LiveView:
     """How well a live run has kept up so far. Refused (404) for others."""
     return live_view(run)
 
 
 @router.get(RUN + "/frames/{frame}")
-def frame_detail(session: OpenSession, run: OpenRun, frame: int) -> FrameDetail:
+def frame_detail(session: OpenSession, run: RunInPath, frame: int) -> FrameDetail:
     """A frame with all its layers; of the frame in progress those that are done."""
     return detail_of(session, run, frame)
 
 
 @router.get(RUN + "/frames/{frame}/layers/{layer}")
-def layer_detail(run: OpenRun, frame: int, layer: int) -> LayerView:
+def layer_detail(run: RunInPath, frame: int, layer: int) -> LayerView:
     """One layer without its particles."""
     return layer_of(run, frame, layer)
 
@@ -68,7 +68,7 @@ def layer_detail(run: OpenRun, frame: int, layer: int) -> LayerView:
     responses={200: {"content": {"application/octet-stream": {}}}},
 )
 def particles(
-    run: OpenRun,
+    run: RunInPath,
     frame: int,
     layer: int,
     form: Annotated[Literal["json", "float32"], Query(alias="format")] = "json",
@@ -83,14 +83,14 @@ def particles(
 
 
 @router.get(RUN + "/frames/{frame}/variance.csv", response_class=Response)
-def variance_csv(run: OpenRun, frame: int) -> Response:
+def variance_csv(run: RunInPath, frame: int) -> Response:
     """The variances of a frame: one row a layer (from 1) and moment, one column a parameter (mm² and rad²)."""
     name = f"{run.name}-frame{frame}-variance.csv"
     return files.download(as_csv(variance_table(run, frame)), name, files.CSV)
 
 
 @router.get(RUN + "/poses.csv", response_class=Response)
-def poses_csv(session: OpenSession, run: OpenRun) -> Response:
+def poses_csv(session: OpenSession, run: RunInPath) -> Response:
     """All poses: frame, then one column per parameter in the body's order (radians and mm)."""
     with run.results() as results:
         numbers, poses = results.poses()
@@ -99,7 +99,7 @@ def poses_csv(session: OpenSession, run: OpenRun) -> Response:
 
 
 @router.get(RUN + "/evaluation")
-def evaluation(session: OpenSession, run: OpenRun) -> Evaluation:
+def evaluation(session: OpenSession, run: RunInPath) -> Evaluation:
     """The error of all finished frames. 404 without a truth or before the first frame."""
     return measured(session, run)
 

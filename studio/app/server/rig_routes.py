@@ -6,7 +6,7 @@ from studio.app.server.answers import Router
 from studio.app.server.app_state import App
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.run_routes import RUN, OpenRun
+from studio.app.server.run_routes import RUN, RunInPath
 from studio.app.server.session_routes import OpenSession
 from studio.operations.jobs.job_runner import Job, JobKind, NumberedJob
 from studio.operations.rigs import check_rig, rig, rig_so_far
@@ -31,7 +31,7 @@ RIG = JobKind(
 
 
 @router.get(RUN + "/rig")
-def known_rig(run: OpenRun) -> RunRig:
+def known_rig(run: RunInPath) -> RunRig:
     """What errors to expect of a run's rig and of others, as far as that was asked."""
     return rig_so_far(run)
 
@@ -39,7 +39,7 @@ def known_rig(run: OpenRun) -> RunRig:
 @router.post(RUN + "/rig", status_code=202)
 def begin_rig(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[Arguments, body_of(rig, "RigRequest")],
     app: App,
 ) -> RigState:

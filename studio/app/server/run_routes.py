@@ -65,7 +65,7 @@ def run_of(session: OpenSession, run: str) -> StoredRun:
     return session.run(run)
 
 
-OpenRun = Annotated[StoredRun, Depends(run_of)]
+RunInPath = Annotated[StoredRun, Depends(run_of)]
 Checked = Annotated[
     bool,
     Query(
@@ -99,7 +99,7 @@ def make_run(
 @router.post(RUN + "/branch", status_code=201)
 def make_branch(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[Arguments, body_of(branch, "BranchRequest")],
     app: App,
 ) -> RunLine:
@@ -112,13 +112,13 @@ def make_branch(
 
 
 @router.get(RUN)
-def run_detail(session: OpenSession, run: OpenRun, check: Checked = True) -> RunDetail:
+def run_detail(session: OpenSession, run: RunInPath, check: Checked = True) -> RunDetail:
     """What was requested of the run, how far it got, and its body's parameters."""
     return detail_of(run, session, check=check)
 
 
 @router.patch(RUN)
-def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, app: App) -> NewName:
+def rename_run(session: OpenSession, run: RunInPath, change: SessionChange, app: App) -> NewName:
     """Give a run another name. Refused while it is being tracked."""
     name = run.name
     if change.name is not None and change.name != name:
@@ -129,7 +129,7 @@ def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, app: A
 
 
 @router.delete(RUN)
-def delete_run(session: OpenSession, run: OpenRun, app: App) -> TrashEntry:
+def delete_run(session: OpenSession, run: RunInPath, app: App) -> TrashEntry:
     """Move a run to the trash. Refused while it is being tracked."""
     with moving(app, session.name, run.name):
         place = app.workspace.trash_run(session.name, run.name)
@@ -138,7 +138,7 @@ def delete_run(session: OpenSession, run: OpenRun, app: App) -> TrashEntry:
 
 
 @router.get(RUN + "/log")
-def log_of(run: OpenRun) -> LogLines:
+def log_of(run: RunInPath) -> LogLines:
     """What the tracking process said of this run, oldest first."""
     return run_log(run)
 
@@ -178,13 +178,13 @@ def set_pace(request: PaceRequest, app: App) -> Posted:
 
 
 @router.post(RUN + "/open", status_code=202)
-def open_run(run: OpenRun, app: App) -> Posted:
+def open_run(run: RunInPath, app: App) -> Posted:
     """Make the run the one that the other commands and the sliders are about."""
     return _post(app, commands.Open(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/start", status_code=202)
-def start(run: OpenRun, app: App) -> Posted:
+def start(run: RunInPath, app: App) -> Posted:
     """Track on from the first frame that has no result; also after the process died (resume).
 
     While another run is being tracked this one waits for its turn.
@@ -193,37 +193,37 @@ def start(run: OpenRun, app: App) -> Posted:
 
 
 @router.post(RUN + "/dequeue", status_code=202)
-def dequeue(run: OpenRun, app: App) -> Posted:
+def dequeue(run: RunInPath, app: App) -> Posted:
     """Take the run out of those that wait to be tracked."""
     return _post(app, commands.Dequeue(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/pause", status_code=202)
-def pause(run: OpenRun, app: App) -> Posted:
+def pause(run: RunInPath, app: App) -> Posted:
     """Stop after the layer in progress."""
     return _post_for(app, run, commands.Pause(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/step-layer", status_code=202)
-def step_layer(run: OpenRun, app: App) -> Posted:
+def step_layer(run: RunInPath, app: App) -> Posted:
     """One layer, then pause inside the frame."""
     return _post_for(app, run, commands.StepLayer(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/step-frame", status_code=202)
-def step_frame(run: OpenRun, app: App) -> Posted:
+def step_frame(run: RunInPath, app: App) -> Posted:
     """Finish the frame at hand or do the next, then pause."""
     return _post_for(app, run, commands.StepFrame(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/seek", status_code=202)
-def seek(run: OpenRun, where: Frame, app: App) -> Posted:
+def seek(run: RunInPath, where: Frame, app: App) -> Posted:
     """Choose the frame that re-annealing works on."""
     return _post_for(app, run, commands.Seek(frame=where.frame, **commands.about(run.folder)))
 
 
 @router.post(RUN + "/reanneal", status_code=202)
-def reanneal(run: OpenRun, where: ReannealRequest, app: App) -> Posted:
+def reanneal(run: RunInPath, where: ReannealRequest, app: App) -> Posted:
     """Anneal a frame again with the knobs as they are; the stored answer stays, unless `keep` replaces it: then the
     frames after it are dropped, and the run as it was goes to the trash.
     """
@@ -233,7 +233,7 @@ def reanneal(run: OpenRun, where: ReannealRequest, app: App) -> Posted:
 
 
 @router.post(RUN + "/cancel", status_code=202)
-def cancel(run: OpenRun, app: App) -> Posted:
+def cancel(run: RunInPath, app: App) -> Posted:
     """End the run; what was tracked stays."""
     return _post_for(app, run, commands.Cancel(**commands.about(run.folder)))
 

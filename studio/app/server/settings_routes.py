@@ -13,7 +13,7 @@ from pydantic import Field
 
 from studio.app.server.answers import Router
 from studio.app.server.app_state import App, AppState
-from studio.app.server.run_routes import RUN, OpenRun, check_free
+from studio.app.server.run_routes import RUN, RunInPath, check_free
 from studio.app.server.schemas import Request
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.declaring import LARGEST
@@ -94,14 +94,14 @@ def pace(
 
 
 @router.get(RUN + "/settings")
-def settings_in_use(run: OpenRun) -> SettingsInUse:
+def settings_in_use(run: RunInPath) -> SettingsInUse:
     """The run's newest settings, since when they are in use, and every change before."""
     return settings_of(run)
 
 
 @router.patch(RUN + "/settings")
 def change_settings(
-    run: OpenRun,
+    run: RunInPath,
     changes: dict[str, Value],
     app: App,
     frame: Annotated[int | None, Query(ge=0, le=LARGEST, description="The frame that is shown.")] = None,
@@ -114,7 +114,7 @@ def change_settings(
 
 
 @router.delete(RUN + "/settings/moved")
-def put_back_settings(run: OpenRun, app: App) -> SettingsInUse:
+def put_back_settings(run: RunInPath, app: App) -> SettingsInUse:
     """Put the knobs that were moved, and that no stored frame uses, back to the run's newest settings."""
     check_free(app, run)
     app.control.request(commands.PutBackSettings(**commands.about(run.folder)))
@@ -122,13 +122,13 @@ def put_back_settings(run: OpenRun, app: App) -> SettingsInUse:
 
 
 @router.post(RUN + "/settings/reset")
-def reset_settings(run: OpenRun, request: ResetRequest, app: App) -> SettingsInUse:
+def reset_settings(run: RunInPath, request: ResetRequest, app: App) -> SettingsInUse:
     """Bring knobs back to their defaults."""
     return _change(app, run, defaults_of(run, request.names))
 
 
 @router.post(RUN + "/settings/preset")
-def use_preset(run: OpenRun, request: PresetChoice, app: App) -> SettingsInUse:
+def use_preset(run: RunInPath, request: PresetChoice, app: App) -> SettingsInUse:
     """Change the knobs of a preset that a run allows; refused where it is made for another tracker or likelihood."""
     return _change(app, run, values_of_preset(run, request.name, app.state_folder))
 

@@ -10,7 +10,7 @@ from studio.app.server.answers import Router, Shown
 from studio.app.server.app_state import App, AppState
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.run_routes import RUN, OpenRun
+from studio.app.server.run_routes import RUN, RunInPath
 from studio.app.server.schemas import Answer, Number
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.csv_text import poses_csv
@@ -85,7 +85,7 @@ def begin_job(
 
 
 @router.get(RUN + "/tracks")
-def tracks(session: OpenSession, run: OpenRun, app: App) -> TrackList:
+def tracks(session: OpenSession, run: RunInPath, app: App) -> TrackList:
     """The run's tracks with how much they jitter and, where there is a truth, how far off they are."""
     going = [state for state in app.jobs.going(TRACK, session.name) if state.run == run.name]
     return TrackList(
@@ -97,7 +97,7 @@ def tracks(session: OpenSession, run: OpenRun, app: App) -> TrackList:
 
 
 @router.get(RUN + "/tracks/{track}/poses.csv", response_class=Response)
-def track_csv(session: OpenSession, run: OpenRun, track: str) -> Response:
+def track_csv(session: OpenSession, run: RunInPath, track: str) -> Response:
     """A track's poses: frame, then one column per parameter in the body's order (radians and mm)."""
     read = read_track(run, track)
     name = f"{session.name}-{run.name}-{read.name}-poses.csv"
@@ -107,7 +107,7 @@ def track_csv(session: OpenSession, run: OpenRun, track: str) -> Response:
 @router.post(RUN + "/refine", status_code=202)
 async def begin_refining(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[Arguments, body_of(refine, "RefineRequest")],
     app: App,
 ) -> TrackJobState:
@@ -125,7 +125,7 @@ async def begin_refining(
 @router.post(RUN + "/smooth", status_code=202)
 async def begin_smoothing(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[Arguments, body_of(smooth, "SmoothRequest")],
     app: App,
 ) -> TrackJobState:
@@ -137,7 +137,7 @@ async def begin_smoothing(
 @router.post(RUN + "/correct", status_code=202)
 async def begin_correction(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[Arguments, body_of(correct, "CorrectionRequest")],
     app: App,
 ) -> TrackJobState:
@@ -173,7 +173,7 @@ def _answer(made: MadeTrack) -> dict[str, Any]:
 
 
 @router.get(RUN + "/check")
-def check(run: OpenRun, track: str = "") -> CheckAnswer:
+def check(run: RunInPath, track: str = "") -> CheckAnswer:
     """What was measured of a track as it is now (empty: the best)."""
     return track_check(run, track)
 
@@ -181,7 +181,7 @@ def check(run: OpenRun, track: str = "") -> CheckAnswer:
 @router.post(RUN + "/check", status_code=202)
 async def begin_check(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[Arguments, body_of(check_run, "CheckRequest")],
     app: App,
 ) -> TrackJobState:
@@ -198,7 +198,7 @@ async def begin_check(
 @router.post(RUN + "/landmarks", status_code=202)
 async def begin_landmarks(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[
         Arguments,
         body_of(evaluate, "LandmarksRequest", without=("truth", "truth_cameras", "truth_up", "align")),

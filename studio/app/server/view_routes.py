@@ -9,7 +9,7 @@ from studio.app.server.answers import Router
 from studio.app.server.app_state import App
 from studio.app.server.job_routes import add_job_routes
 from studio.app.server.requests import Arguments, body_of
-from studio.app.server.run_routes import RUN, OpenRun
+from studio.app.server.run_routes import RUN, RunInPath
 from studio.app.server.session_routes import OpenSession
 from studio.foundations.declaring import LARGEST
 from studio.foundations.errors import RunError
@@ -86,7 +86,7 @@ Selected = Annotated[Selection, Depends(Selection)]
 
 
 def inspected_run(
-    run: OpenRun,
+    run: RunInPath,
     app: App,
     trial: Annotated[
         str, Query(max_length=32, description="A trial that is looked at in the place of its frame.")
@@ -120,7 +120,7 @@ def run_view(inspected: Inspected, view: str, selection: Selected) -> ViewAnswer
 @router.get(RUN + "/shared.html", response_class=Response)
 def shared(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     frame: Annotated[int | None, Query(ge=0, le=LARGEST, description="Default: the run's worst one.")] = None,
     track: Name = "",
     clouds: Annotated[
@@ -135,7 +135,7 @@ def shared(
 @router.post(RUN + "/frames/{frame}/seeds", status_code=202)
 def begin_seeds(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     frame: int,
     arguments: Annotated[Arguments, body_of(seeds, "SeedsRequest", without=("frame",))],
     inspected: Inspected,
@@ -157,7 +157,7 @@ add_job_routes(router, "/seeds/{identifier}", SEEDS)
 @router.post(RUN + "/split-error", status_code=202)
 def begin_split(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[Arguments, body_of(split_error, "SplitRequest")],
     app: App,
 ) -> SplitState:
@@ -179,7 +179,7 @@ add_job_routes(router, "/split-error/{identifier}", SPLIT)
 @router.post(RUN + "/uncertainty", status_code=202)
 def begin_uncertainty(
     session: OpenSession,
-    run: OpenRun,
+    run: RunInPath,
     arguments: Annotated[Arguments, body_of(uncertainty, "UncertaintyRequest")],
     app: App,
 ) -> UncertaintyState:

@@ -94,7 +94,7 @@ class Footage:
         return self._pictures[camera].read(self._check_frame(frame))
 
     def mask(self, camera: str, frame: int) -> Bytes | None:
-        """(H, W) uint8, 0 or 255, the mask that came with the data, or None where the camera has none."""
+        """(H, W) uint8, 0 or 255, the mask of the camera's file, given or made in set-up, or None where it has none."""
         kept = self._masks.get(camera)
         return None if kept is None else kept.read(self._check_frame(frame))
 
@@ -107,12 +107,12 @@ class Footage:
         return FramePictures(frame, self.cameras, tuple(self.picture(name, frame) for name in self.cameras))
 
     def masks(self, frame: int) -> dict[str, Bytes] | None:
-        """The masks that came with the data by camera, or None if no camera has any."""
+        """The masks of the cameras that have files of them, given or made in set-up; None if none has."""
         masks = {name: kept.read(self._check_frame(frame)) for name, kept in self._masks.items()}
         return masks or None
 
     def has_masks(self, camera: str) -> bool:
-        """Whether masks came with a camera's pictures."""
+        """Whether a camera has mask files, given with its pictures or made in set-up."""
         return camera in self._masks
 
     def size(self, camera: str) -> tuple[int, int]:

@@ -1,8 +1,8 @@
 """The tracking process: commands in, events out, one layer between them; and its other end, in the server.
 
 Commands come through one pipe, which also says (by its end) that the server is gone; events leave through the other
-from a thread of their own, newest first to win, so that a slow server never holds up the search. The same thread sends
-a heartbeat when there is nothing else to say.
+from a thread of their own, where a newer one of the same key takes the place of one that still waits, so that a slow
+server never holds up the search. The same thread sends a heartbeat when there is nothing else to say.
 """
 
 import contextlib

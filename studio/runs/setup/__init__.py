@@ -1,10 +1,10 @@
 """What is set up before a run: masks, cameras turned, the subject and its start pose.
 
 Masks that the studio makes itself are files like those that come with footage: a person's by the network of
-`evidence/person_network.py` (`person_masks.py`), anything's by brush strokes (`stroke_masks.py`,
-`evidence/stroke_cut.py`), each camera's best source (`best_source.py`, by agreement and edges), or one of several
-subjects (`subject_masks.py`). `sessions/background_files.py` puts them under `person_masks/`, `stroke_masks/`,
-`chosen_masks/` or `subject_masks/`, lets the manifest name them and remembers the given ones. `contrast.py` says where
+`evidence/person_network.py` (`person_masks.py`), an animal's before known backgrounds (`animal_masks.py`), anything's
+by brush strokes (`stroke_masks.py`, `evidence/stroke_cut.py`), each camera's best source (`best_source.py`, by
+agreement and edges), or one of several subjects (`subject_masks.py`). `sessions/background_files.py` puts each kind
+in a folder of its own, lets the manifest name them and remembers the given ones. `contrast.py` says where
 subject and background are alike, which agreement cannot see.
 
 Of several subjects `subject_masks.py` cuts out all but one: their pieces of the hull are followed over time, each

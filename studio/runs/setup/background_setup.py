@@ -1,7 +1,8 @@
 """Sets up a session's masks: the background, its knobs and the excluded regions.
 
 Sources: "plate" and "clip" (as given), "median" (of the footage), "combined" (plate and footage by region,
-`evidence.combined_background`; with three cameras or more cleaned by the other views, `runs.setup.clean_plates`);
+`evidence.combined_background`; with three cameras or more cleaned by the other views, `runs.setup.clean_plates`),
+"animal" (before a known background, without shadow and reflection, `runs.setup.animal_masks`);
 without any background "person" (masks that a network makes, `runs.setup.person_masks`), "strokes" (of anything, from
 a few brush strokes, `runs.setup.stroke_masks`), "threshold" (by brightness and colour) and "masks" (which came with
 the footage). "best" tries all of these and takes the best of each camera (`runs.setup.best_source`). Of several

@@ -47,7 +47,13 @@ from studio.search.trackers.particles import (
 )
 from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.resampling import draw, draw_others, equal_draw
-from studio.search.trackers.settings import PRESETS, VARIANTS, AnnealedSettings, layer_survivals
+from studio.search.trackers.settings import (
+    PRESETS,
+    VARIANTS,
+    AnnealedSettings,
+    layer_survival,
+    layer_survivals,
+)
 from studio.search.trackers.tracker import (
     NO_PARENT,
     Arrays,
@@ -107,7 +113,7 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
             particles = constrain_set(numbers, particles, problem, space, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
         free, extra = share_in(particles.extra), compare_kinds(particles.extra, eligible)
-        survival = layer_survivals(settings, layer + 1)[-1]
+        survival = layer_survival(settings, layer)
         annealed = anneal(eligible, survival)
         weighted = ParticleSet(particles.poses, annealed.log_weights, raw, extra)
         if layer == settings.layers - 1:
@@ -140,7 +146,7 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
         """The layer's α, children and noise; None where a behaviour model guides the particles."""
         if STATES in extra or is_guided(space, settings.prediction):
             return None
-        survival = layer_survivals(settings, layer + 1)[-1]
+        survival = layer_survival(settings, layer)
         noise = _noise(layer, space, settings) if layer < settings.layers - 1 else None
         return LayerPlan(survival, noise, crossed=settings.crossover)
 

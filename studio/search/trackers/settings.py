@@ -197,6 +197,11 @@ def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...
     return tuple(rates[min(index, len(rates) - 1)] for index in range(layers))
 
 
+def layer_survival(settings: AnnealedSettings, layer: int) -> float:
+    """Target α of a layer, counted in the order they run."""
+    return layer_survivals(settings, layer + 1)[layer]
+
+
 # The improved filter is the tracker's own default.
 _IMPROVED: dict[str, Value] = {
     name: getattr(AnnealedSettings(), name)
