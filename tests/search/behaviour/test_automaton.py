@@ -85,6 +85,7 @@ def test_predictions_back_off_to_shorter_contexts(automaton: Automaton) -> None:
 
 def test_arcs_are_the_transitions_above_zero(automaton: Automaton) -> None:
     arcs = automaton.arcs
+    assert arcs.first.tolist() == [0, 2, 4, 5, 7]
     for state in range(automaton.size):
         own = slice(arcs.first[state], arcs.first[state + 1])
         np.testing.assert_array_equal(arcs.symbols[own], np.flatnonzero(automaton.probabilities[state]))

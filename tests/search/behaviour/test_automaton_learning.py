@@ -175,12 +175,64 @@ def test_only_seen_transitions_are_possible() -> None:
             assert (context[-1], label) in seen
 
 
+def kept_contexts(recordings: list[np.ndarray], symbols: int, test: ContextTest) -> set[tuple[int, ...]]:
+    automaton = learn_automaton(recordings, symbols, test)
+    return {context for context, keep in zip(automaton.contexts, automaton.kept, strict=True) if keep}
+
+
+def pairs(counts: list[list[int]]) -> list[np.ndarray]:
+    """Recordings of two labels each, as many of each pair as counted."""
+    return [
+        np.array([one, other])
+        for one, row in enumerate(counts)
+        for other, count in enumerate(row)
+        for _ in range(count)
+    ]
+
+
+def test_a_label_that_is_1_plus_epsilon_times_as_probable_to_the_last_digit_keeps_a_context() -> None:
+    # 0 is a quarter of all labels, and three eighths of those after a 0; 1 is less probable there by 5/6.
+    more = pairs([[3, 5], [1, 15]])
+    assert (0,) in kept_contexts(more, 2, ContextTest(1, 0.5, 0.0))
+    assert (0,) not in kept_contexts(more, 2, ContextTest(1, 0.51, 0.0))
+    # Both labels are as frequent; after each there is three times as often the same again.
+    less = pairs([[3, 1], [1, 3]])
+    assert kept_contexts(less, 2, ContextTest(1, 1.0, 0.0)) == {(), (0,), (1,)}
+    assert kept_contexts(less, 2, ContextTest(1, 1.01, 0.0)) == {()}
+
+
+def test_a_context_is_tried_where_it_has_two_followers_or_the_least_share_of_all_labels() -> None:
+    once = [np.array([0] * 30 + [1, 2]), np.array([0] * 10)]
+    twice = [np.array([0] * 30 + [1, 2]), np.array([0] * 10 + [1, 2])]
+    assert (1,) not in kept_contexts(once, 3, ContextTest(1, 0.5, 0.0))
+    assert (1,) in kept_contexts(twice, 3, ContextTest(1, 0.5, 0.0))
+    # Two followers of 44 labels.
+    assert (1,) in kept_contexts(twice, 3, ContextTest(1, 0.5, 2 / 44))
+    assert (1,) not in kept_contexts(twice, 3, ContextTest(1, 0.5, 2.1 / 44))
+
+
+def test_a_label_that_a_context_hardly_gives_does_not_count() -> None:
+    # After a 0, 3 follows once in a thousand and one times, and nowhere else: many times as often as after anything.
+    counts = np.array([[400, 300, 300, 0], [400, 300, 300, 0], [400, 300, 300, 0]])
+    counts[0, 3] = 1
+    rare, frequent = counts.tolist(), counts.tolist()
+    frequent[0][0] -= 1
+    assert (0,) not in kept_contexts(pairs(rare), 4, ContextTest(1, 1.0, 0.0))
+    assert (0,) in kept_contexts(pairs(frequent), 4, ContextTest(1, 1.0, 0.0))
+
+
+def test_smoothing_and_back_off_are_passed_on() -> None:
+    automaton = learn_automaton(random_recordings(1, 3), 3, TEST, smoothing=0.02, back_off=0.3)
+    assert (automaton.smoothing, automaton.back_off) == (0.02, 0.3)
+
+
 @pytest.mark.parametrize(
     ("recordings", "words"),
     [
         ([], "no labels to learn"),
         ([np.zeros(0, dtype=int)], "no labels to learn"),
         ([np.array([0, 3])], "outside 0 to 2"),
+        ([np.array([0, -1])], "outside 0 to 2"),
     ],
 )
 def test_bad_labels_are_refused(recordings: list[np.ndarray], words: str) -> None:

@@ -11,7 +11,12 @@ from scipy.stats import multivariate_normal
 from studio.foundations.errors import BehaviourError
 from studio.search.behaviour.figueiredo_jain import Search, fit_mixture, parameters_of
 from studio.search.behaviour.gaussian_mixture import GaussianMixture
-from studio.search.behaviour.mixture_kernels import losses_without
+from studio.search.behaviour.mixture_kernels import (
+    losses_without,
+    replace_component,
+    shares_of,
+    sum_of_others,
+)
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,127 @@ def test_what_is_lost_without_a_component_is_exact_where_points_are_all_its_own(
         for number in range(3)
     ]
     np.testing.assert_allclose(losses_without(densities, logs, logsumexp(joint, axis=0)), wanted, rtol=1e-9)
+
+
+@dataclass
+class PlainSearch:
+    """Component-wise EM as it is defined: after each update all shares are taken afresh."""
+
+    points: np.ndarray
+    diagonal: bool
+    weights: np.ndarray
+    means: list[np.ndarray]
+    covariances: list[np.ndarray]
+    floor: np.ndarray
+
+    @classmethod
+    def begun(
+        cls, points: np.ndarray, rng: np.random.Generator, most: int, diagonal: bool, floor: tuple[float, ...]
+    ) -> "PlainSearch":
+        variance, width = points.var(axis=0).mean(), points.shape[1]
+        means = list(points[rng.choice(len(points), most, replace=False)])
+        least = 1e-6 * variance * np.eye(width) + np.diag(floor or np.zeros(width))
+        starts = [0.1 * variance * np.eye(width)] * most
+        return cls(points, diagonal, np.full(most, 1.0 / most), means, starts, least)
+
+    @property
+    def parameters(self) -> float:
+        width = self.points.shape[1]
+        return 2.0 * width if self.diagonal else width + width * (width + 1) / 2
+
+    def joint(self) -> np.ndarray:
+        parts = zip(self.weights, self.means, self.covariances, strict=True)
+        return np.stack([np.log(w) + multivariate_normal(m, c).logpdf(self.points) for w, m, c in parts])
+
+    def reached(self) -> tuple[int, float, float]:
+        """Components, message length and log-likelihood."""
+        joint = self.joint()
+        totals, size = logsumexp(joint, axis=0), len(joint)
+        support = np.exp(joint - totals).sum(axis=1)
+        shape = self.parameters / 2 * np.log(support).sum() + size / 2 * np.log(len(self.points))
+        return size, shape - totals.sum(), totals.sum()
+
+    def remove(self, number: int) -> None:
+        self.weights = np.delete(self.weights, number)
+        self.weights = self.weights / self.weights.sum()
+        del self.means[number], self.covariances[number]
+
+    def sweep(self) -> None:
+        number = 0
+        while number < len(self.weights):
+            joint = self.joint()
+            share = np.exp(joint[number] - logsumexp(joint, axis=0))
+            strength = max(0.0, share.sum() - self.parameters / 2) / len(self.points)
+            if strength == 0.0 and len(self.weights) > 1:
+                self.remove(number)
+                continue
+            self.means[number] = share @ self.points / share.sum()
+            away = self.points - self.means[number]
+            spread = (away * share[:, None]).T @ away / share.sum()
+            self.covariances[number] = (np.diag(np.diag(spread)) if self.diagonal else spread) + self.floor
+            self.weights[number] = max(strength, 1.0 / len(self.points))
+            self.weights = self.weights / self.weights.sum()
+            number += 1
+
+    def converge(self) -> int:
+        before = np.inf
+        for sweep in itertools.count(1):
+            self.sweep()
+            after = self.reached()[1]
+            if abs(after - before) < 1e-3 * len(self.points):
+                return sweep
+            before = after
+        raise AssertionError
+
+    def likelihood_without(self, number: int) -> float:
+        joint = np.delete(self.joint(), number, axis=0)
+        return float((logsumexp(joint, axis=0) - np.log1p(-self.weights[number])).sum())
+
+
+@pytest.mark.parametrize(("covariance", "floor"), [("full", ()), ("diagonal", (0.05, 0.02))])
+def test_the_search_takes_the_course_of_its_definition(covariance: str, floor: tuple[float, ...]) -> None:
+    points = unequal().sample(150, np.random.default_rng(2))
+    plain = PlainSearch.begun(points, np.random.default_rng(3), 7, covariance == "diagonal", floor)
+    course, best = [], None
+    while True:
+        sweeps = plain.converge()
+        course.append((*plain.reached(), sweeps))
+        if best is None or course[-1][1] < min(length for _, length, *_ in course[:-1]):
+            best = plain.weights, np.array(plain.means), np.array(plain.covariances)
+        if len(plain.weights) == 1:
+            break
+        plain.remove(int(np.argmax([plain.likelihood_without(one) for one in range(len(plain.weights))])))
+    mixture, history = fit_mixture(
+        points, np.random.default_rng(3), Search(most=7, covariance=covariance, floor=floor)
+    )
+    found = [(one.components, one.length, one.log_likelihood, one.sweeps) for one in history]
+    np.testing.assert_allclose(found, course, rtol=1e-7)
+    for one, other in zip((mixture.weights, mixture.means, mixture.covariances), best, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
+
+
+def test_shares_and_totals_are_those_of_all_components_summed_afresh() -> None:
+    rng = np.random.default_rng(4)
+    # The second component is nearly all, some, next to nothing of what a point has; before and after.
+    levels = np.array([900.0, 45.0, 9.0, 5.0, 0.0, -9.0, -39.0, -45.0, -900.0])
+    before, after = (part.ravel() for part in np.meshgrid(levels, levels))
+    densities = rng.normal(size=(3, len(before)))
+    densities[1] += before
+    logs, weight = np.log([0.5, 0.2, 0.3]), np.log(0.35)
+    totals = logsumexp(densities + logs[:, None], axis=0)
+    share = np.exp(logs[1] + densities[1] - totals)
+    found = shares_of(densities[1], logs[1], totals)
+    np.testing.assert_allclose(found, np.where(share > np.exp(-40.0), share, 0.0), rtol=1e-12)
+    assert shares_of(np.array([1e-9]), 0.0, np.zeros(1))[0] == 1.0
+    others = [sum_of_others(densities, logs, 1, point) for point in range(len(before))]
+    np.testing.assert_allclose(others, logsumexp(np.delete(densities + logs[:, None], 1, axis=0), axis=0))
+    assert sum_of_others(densities[:1], logs[:1], 0, 0) == -np.inf
+    new = rng.normal(size=len(after)) + after
+    changed = densities.copy()
+    replace_component(changed, logs, 1, new, weight, totals)
+    np.testing.assert_array_equal(changed, [densities[0], new, densities[2]])
+    logs[1] = weight
+    np.testing.assert_allclose(totals, logsumexp(changed + logs[:, None], axis=0), rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.parametrize("make", [separated, overlapping, unequal])
@@ -155,6 +281,42 @@ def test_patience_ends_the_search_and_keeps_the_best() -> None:
     np.testing.assert_array_equal(short.means, whole.means)
 
 
+@pytest.mark.parametrize("patience", [1, 2, 4])
+def test_patience_is_the_number_of_removals_in_a_row_without_a_shorter_message(patience: int) -> None:
+    points = overlapping().sample(300, np.random.default_rng(9))
+    _, whole = fit_mixture(points, np.random.default_rng(1), Search(most=12))
+    shortest = np.minimum.accumulate([entry.length for entry in whole])
+    since, wanted = 0, len(whole)
+    for place in range(1, len(whole)):
+        since = since + 1 if shortest[place] == shortest[place - 1] else 0
+        if since == patience:
+            wanted = place + 1
+            break
+    _, history = fit_mixture(points, np.random.default_rng(1), Search(most=12, patience=patience))
+    assert history == whole[:wanted]
+
+
+def test_the_search_goes_down_to_the_fewest_asked_for() -> None:
+    points = separated().sample(200, np.random.default_rng(9))
+    for least in (1, 2, 3):
+        mixture, history = fit_mixture(points, np.random.default_rng(1), Search(most=6, least=least))
+        assert min(entry.components for entry in history) == least
+        assert mixture.size >= least
+
+
+def test_as_few_points_as_a_component_needs_are_enough() -> None:
+    points = np.random.default_rng(0).standard_normal((4, 2))
+    # Five parameters: two points and a half.
+    mixture, _ = fit_mixture(points[:3], np.random.default_rng(0), Search(most=9))
+    np.testing.assert_allclose(mixture.means[0], points[:3].mean(axis=0))
+    with pytest.raises(BehaviourError, match="2 frames are too few") as refusal:
+        fit_mixture(points[:2], np.random.default_rng(0), Search(most=9))
+    assert "3 or more" in refusal.value.hint
+    with pytest.raises(BehaviourError, match="1 frames are too few") as refusal:
+        fit_mixture(points[:1, :1], np.random.default_rng(0), Search(most=1, covariance="diagonal"))
+    assert "2 or more" in refusal.value.hint
+
+
 def test_same_seed_same_mixture() -> None:
     points = unequal().sample(600, np.random.default_rng(0))
     one, _ = fit_mixture(points, np.random.default_rng(7), Search(most=12))
@@ -175,6 +337,8 @@ def test_progress_is_reported() -> None:
     [
         (np.zeros((100, 38)), Search(most=5), "100 frames are too few"),
         (np.full((100, 2), np.nan), Search(most=5), "not finite"),
+        (np.zeros(100), Search(most=5), "not finite"),
+        (np.zeros((100, 2)), Search(most=5, least=0), "from 5 down to 0"),
         (np.zeros((100, 2)), Search(most=5, least=6), "from 5 down to 6"),
         (np.zeros((100, 2)), Search(most=5, covariance="round"), "'round'"),
     ],

@@ -57,3 +57,23 @@ def test_chosen_components_keep_their_ratio(mixture: GaussianMixture) -> None:
     part = mixture.chosen(np.array([1, 3]))
     np.testing.assert_allclose(part.weights, [1 / 3, 2 / 3])
     np.testing.assert_array_equal(part.means, mixture.means[[1, 3]])
+
+
+def test_variances_are_those_of_all_components_together(mixture: GaussianMixture) -> None:
+    # E x² - (E x)² of the mixture.
+    squares = np.diagonal(mixture.covariances, axis1=1, axis2=2) + mixture.means**2
+    wanted = mixture.weights @ squares - (mixture.weights @ mixture.means) ** 2
+    np.testing.assert_allclose(mixture.variances, wanted)
+    assert mixture.size == 4
+
+
+def test_a_covariance_that_is_flat_but_for_rounding_has_a_root() -> None:
+    flat = np.array([[[1.0, 1.0], [1.0, 1.0 - 1e-15]]])
+    root = GaussianMixture(np.ones(1), np.zeros((1, 2)), flat).roots[0]
+    np.testing.assert_allclose(root, np.full((2, 2), 0.5**0.5), atol=1e-7)
+
+
+def test_a_component_without_weight_is_no_points_label(mixture: GaussianMixture) -> None:
+    none = GaussianMixture(np.array([0.0, 0.3, 0.3, 0.4]), mixture.means, mixture.covariances)
+    assert none.labels(mixture.means[:1])[0] != 0
+    assert none.responsibilities(mixture.means)[0, 0] == 0.0

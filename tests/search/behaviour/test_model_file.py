@@ -3,6 +3,7 @@
 import io
 import json
 import zipfile
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +21,14 @@ def model() -> BehaviourModel:
     return toy_model()
 
 
+def arrays_of(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as archive:
+        return {name: archive[name] for name in archive.files}
+
+
 def rewritten(path: Path, **changes: object) -> None:
     """Changes entries of a model's head in its file."""
-    with np.load(path) as archive:
-        arrays = {name: archive[name] for name in archive.files}
+    arrays = arrays_of(path)
     head = json.loads(arrays.pop("head").tobytes()) | changes
     with path.open("wb") as file:
         np.savez(file, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
@@ -57,6 +62,59 @@ def test_another_rate_is_kept(model: BehaviourModel, tmp_path: Path) -> None:
     write_model(model.at_rate(60.0), path)
     back = read_model(path)
     assert (back.fps, back.making.learnt_fps) == (60.0, 25.0)
+
+
+def test_all_of_a_model_is_kept(model: BehaviourModel, tmp_path: Path) -> None:
+    automaton = replace(model.automaton, smoothing=0.02, back_off=0.3)
+    making = replace(model.making, sources=("walk", "run"), entropy_test=1.5)
+    whole = replace(model, automaton=automaton, making=making)
+    write_model(whole, tmp_path / "one.behaviour")
+    back = read_model(tmp_path / "one.behaviour")
+    assert (back.automaton.smoothing, back.automaton.back_off) == (0.02, 0.3)
+    assert (back.making.sources, back.making.entropy_test) == (("walk", "run"), 1.5)
+    assert back.making.frames == model.making.frames
+    assert back.reduction.kept == model.reduction.kept
+    write_model(back, tmp_path / "other.behaviour")
+    one, other = arrays_of(tmp_path / "one.behaviour"), arrays_of(tmp_path / "other.behaviour")
+    assert one.keys() == other.keys()
+    for name, values in one.items():
+        np.testing.assert_array_equal(values, other[name])
+
+
+def test_arrays_that_do_not_fit_each_other_are_refused(model: BehaviourModel, tmp_path: Path) -> None:
+    path = tmp_path / "odd.behaviour"
+    write_model(model, path)
+    whole = arrays_of(path)
+    # The labels are only what the automaton is learnt from again.
+    alone = {"head", "labels", "label_lengths", "mixture_weights", "dynamics_weights", "middle", "turning"}
+    alone |= {"prototype_recordings", "prototype_frames", "contexts"}
+    for name in whole.keys() - alone:
+        for axis in range(whole[name].ndim):
+            shorter = np.delete(whole[name], -1, axis)
+            with path.open("wb") as file:
+                np.savez(file, **(whole | {name: shorter}))
+            with pytest.raises(BehaviourError, match="not a behaviour model"):
+                read_model(path)
+    for state in (-1, model.states):
+        states = whole["next_state"].copy()
+        states[1, 0] = state
+        with path.open("wb") as file:
+            np.savez(file, **(whole | {"next_state": states}))
+        with pytest.raises(BehaviourError, match="not a behaviour model"):
+            read_model(path)
+    states[1, 0] = model.states - 1
+    with path.open("wb") as file:
+        np.savez(file, **(whole | {"next_state": states}))
+    assert read_model(path).automaton.next_state[1, 0] == model.states - 1
+
+
+def test_a_model_of_before_the_floors_has_clusters_without_one(model: BehaviourModel, tmp_path: Path) -> None:
+    path = tmp_path / "old.behaviour"
+    write_model(model, path)
+    settings = asdict(model.making.settings)
+    del settings["cluster_floor"]
+    rewritten(path, settings=settings)
+    assert read_model(path).making.settings == replace(model.making.settings, cluster_floor=0.0)
 
 
 def test_a_missing_file(tmp_path: Path) -> None:

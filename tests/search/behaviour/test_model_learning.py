@@ -9,8 +9,9 @@ from toy_behaviour import FPS, SETTINGS, recordings, toy_model, waves
 from studio.body.catalogue import load_body
 from studio.foundations.errors import BehaviourError
 from studio.foundations.knobs import changed
+from studio.search.behaviour.automaton_learning import ContextTest, learn_automaton
 from studio.search.behaviour.model import BehaviourModel
-from studio.search.behaviour.model_learning import learn_model
+from studio.search.behaviour.model_learning import cluster_floor, learn_model
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +112,51 @@ def test_the_whole_space_and_diagonal_clusters_work_too() -> None:
     assert diagonal.clusters >= 4
     # Noise is still that of the frames, with all its correlations.
     assert np.abs(diagonal.dynamics.covariances[:, 0, 1]).max() > 0.0
+
+
+def test_what_never_moves_has_a_least_variance() -> None:
+    still = [poses * [1.0, 1.0, 0.0, 1.0] + [0.0, 0.0, 0.3, 0.0] for poses in recordings()]
+    model = learn_model(still, load_body("planar_arm4"), FPS, SETTINGS, np.random.default_rng(0))
+    features = np.concatenate([model.space.features(poses) for poses in still])
+    # A millionth of the mean variance of all angles, and of that of their derivatives.
+    least = 1e-6 * features.var(axis=0).reshape(2, 4).mean(axis=1)
+    for place, wanted in zip((2, 6), least, strict=True):
+        np.testing.assert_allclose(model.dynamics.covariances[:, place, place], wanted, rtol=1e-6)
+    none = [np.repeat(poses[:1], 50, axis=0) for poses in still[:1]]
+    frozen = learn_model(none, load_body("planar_arm4"), FPS, SETTINGS, np.random.default_rng(0))
+    np.testing.assert_allclose(frozen.dynamics.covariances[0], 1e-12 * np.eye(8), atol=1e-20)
+
+
+def test_the_floor_of_clusters_is_a_share_of_all_variances() -> None:
+    variances = np.array([4.0, 0.5])
+    np.testing.assert_allclose(
+        cluster_floor(changed(SETTINGS, {"cluster_floor": 0.01}), variances), [0.04, 0.005]
+    )
+    assert cluster_floor(changed(SETTINGS, {"cluster_floor": 0.0}), variances) == ()
+    wide = toy_model(cluster_floor=0.4, covariance="diagonal")
+    points = np.concatenate([wide.reduction.reduced(wide.space.features(poses)) for poses in recordings()])
+    least = np.diagonal(wide.mixture.covariances, axis1=1, axis2=2)
+    assert (least >= 0.4 * points.var(axis=0)).all()
+
+
+def test_clusters_as_poses_alone_are_the_margins(model: BehaviourModel) -> None:
+    alone = model.poses_only
+    np.testing.assert_array_equal(alone.weights, model.dynamics.weights)
+    np.testing.assert_array_equal(alone.means, model.dynamics.means[:, :4])
+    np.testing.assert_array_equal(alone.covariances, model.dynamics.covariances[:, :4, :4])
+
+
+def test_the_automatons_settings_are_the_learnings(model: BehaviourModel) -> None:
+    other = changed(
+        SETTINGS,
+        {"memory": 2, "epsilon": 0.7, "least_probability": 0.01, "smoothing": 0.02, "back_off": 0.3},
+    )
+    wanted = learn_automaton(model.making.labels, model.clusters, ContextTest(2, 0.7, 0.01))
+    found = model.with_automaton(other)
+    assert found.automaton.contexts == wanted.contexts
+    assert (found.automaton.smoothing, found.automaton.back_off) == (0.02, 0.3)
+    assert found.making.entropy_train == found.automaton.entropy(model.making.labels)
+    assert np.isnan(found.making.entropy_test)
 
 
 def test_a_larger_body_and_progress() -> None:

@@ -61,3 +61,37 @@ def test_a_cluster_with_fewer_frames_than_features_has_a_covariance_of_full_rank
     own = np.cov(features[300:].T, bias=True)
     pooled = (300 * np.cov(features[:300].T, bias=True) + 4 * own) / 304
     np.testing.assert_allclose(small, (4 * own + 6 * pooled) / 10, atol=1e-6)
+
+
+def test_the_largest_entry_of_every_component_is_positive(features: np.ndarray) -> None:
+    for count in (1, 2, 5):
+        rows = fit_reduction(features, count).loadings
+        assert rows.shape == (count, 6)
+        assert (rows[np.arange(count), np.abs(rows).argmax(axis=1)] > 0.0).all()
+        np.testing.assert_allclose(rows @ rows.T, np.eye(count), atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [0, 6, 7])
+def test_as_many_components_as_features_turn_nothing(features: np.ndarray, count: int) -> None:
+    reduction = fit_reduction(features, count)
+    np.testing.assert_array_equal(reduction.loadings, np.eye(6))
+    np.testing.assert_allclose(reduction.reduced(features).mean(axis=0), 0.0, atol=1e-12)
+
+
+def test_frames_count_by_their_shares_in_a_cluster() -> None:
+    rng = np.random.default_rng(3)
+    features, floor = rng.standard_normal((40, 2)), np.array([0.2, 0.3])
+    shares = rng.dirichlet([1.0, 2.0, 3.0], size=40)
+    mixture = full_clusters(features, shares, floor)
+    spreads = []
+    for number in range(3):
+        mean = np.average(features, axis=0, weights=shares[:, number])
+        np.testing.assert_allclose(mixture.means[number], mean)
+        away = features - mean
+        spreads.append(np.einsum("n,ni,nj->ij", shares[:, number], away, away))
+    strength = shares.sum(axis=0)
+    np.testing.assert_allclose(mixture.weights, strength / 40)
+    for number in range(3):
+        # Two frames of the clusters' common covariance are added, as there are two features.
+        wanted = (spreads[number] + 2 * sum(spreads) / 40) / (strength[number] + 2) + np.diag(floor)
+        np.testing.assert_allclose(mixture.covariances[number], wanted)

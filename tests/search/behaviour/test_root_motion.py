@@ -107,6 +107,36 @@ def test_changes_do_not_depend_on_the_heading(name: str, angle: float) -> None:
     )
 
 
+def test_a_heading_may_be_the_first_parameter_and_none_turns_nothing() -> None:
+    columns, turning = np.array([0, 1, 2]), np.array([True, False, False])
+    poses = np.array([[0.5 * np.pi, 3.0, 4.0], [0.5 * np.pi, 3.0, 9.0]])
+    facing = RootFrame(columns, turning, 0, np.array([1, 2]))
+    # Facing +y, 5 mm along y are 5 mm ahead.
+    np.testing.assert_allclose(facing.changes(poses)[1], [0.0, 5.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(
+        facing.moved(poses[:1], np.array([[0.1, 5.0, 1.0]])), [[0.5 * np.pi + 0.1, 2.0, 9.0]]
+    )
+    for nowhere in (
+        RootFrame(columns, turning, -1, np.array([1, 2])),
+        RootFrame(columns, turning, 0, columns[:0]),
+    ):
+        np.testing.assert_allclose(nowhere.changes(poses)[1], [0.0, 0.0, 5.0], atol=1e-12)
+
+
+def test_clusters_vary_at_least_a_little_of_what_all_do() -> None:
+    rng = np.random.default_rng(5)
+    changes = np.column_stack([rng.normal(size=200), np.full(200, 3.0)])
+    # All frames of the second cluster are alike: beyond the least it has two frames of the common covariance.
+    changes[150:] = [9.0, 3.0]
+    shares = np.repeat(np.eye(2), [150, 50], axis=0)
+    found = gaussians_of(changes, shares)
+    common = 150 * changes[:150, 0].var() / 200
+    least = 1e-3 * changes[:, 0].var()
+    np.testing.assert_allclose(found.covariances[1, 0, 0], 2 * common / 52 + least)
+    assert 0.0 < found.covariances[1, 1, 1] < 1e-11
+    np.testing.assert_allclose(found.means, [[changes[:150, 0].mean(), 3.0], [9.0, 3.0]])
+
+
 def test_fixed_bodies_have_none(tmp_path: Path) -> None:
     assert root_frame(load_body("planar_arm4")) is None
     fixed = toy_model()
