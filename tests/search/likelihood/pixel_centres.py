@@ -1,6 +1,7 @@
 """A rasteriser by pixel centres, in plain NumPy: the oracle of exact areas."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studio.foundations.arrays import Array, Mask
 
@@ -38,3 +39,23 @@ def union(corners: Array, width: int, height: int, scale: float = 1.0) -> tuple[
         surely[box] |= deep >= NEAR
         perhaps[box] |= deep > -NEAR
     return drawn, surely, perhaps
+
+
+def triangles_drawn(
+    seen: Array, triangles: NDArray[np.int64], width: int, height: int
+) -> tuple[Array, Array]:
+    """(H, W) number of the nearest triangle at each pixel's centre, -1 where there is none, and its depth there,
+    infinite where there is none. seen : (V, 3) pixel and depth of the triangles' (F, 3) points, NaN where not seen.
+    """
+    owner, depth = np.full((height, width), -1), np.full((height, width), np.inf)
+    y, x = np.mgrid[:height, :width].astype(float)
+    centres = np.stack([x, y, np.ones_like(x)])
+    for number, corners in enumerate(seen[triangles]):
+        if not np.isfinite(corners).all():
+            continue
+        shares = np.einsum("ij,jhw->ihw", np.linalg.inv([*corners[:, :2].T, np.ones(3)]), centres)
+        # Shares are even in the picture by depth: one over the depth is, too.
+        here = 1.0 / np.einsum("i,ihw->hw", 1.0 / corners[:, 2], shares)
+        nearer = (shares >= 0.0).all(axis=0) & (here < depth)
+        owner[nearer], depth[nearer] = number, here[nearer]
+    return owner, depth
