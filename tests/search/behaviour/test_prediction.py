@@ -142,6 +142,53 @@ def test_start_states_are_spread_over_the_clusters(model: BehaviourModel) -> Non
     assert np.abs(away).max() < 5.0 / np.sqrt(own.sum())
 
 
+def test_every_start_is_sampled_from_its_states_own_cluster(model: BehaviourModel) -> None:
+    start = start_states(np.random.default_rng(3), model, MANY)
+    labels = model.automaton.last_symbols[start.states]
+    found = np.hstack([start.values, start.velocities])
+    assert set(labels) == set(range(model.clusters))
+    for cluster in range(model.clusters):
+        own = found[labels == cluster]
+        scale = np.sqrt(np.diag(model.dynamics.covariances[cluster]))
+        away = (own.mean(axis=0) - model.dynamics.means[cluster]) / scale
+        assert np.abs(away).max() < 5.0 / np.sqrt(len(own))
+        assert np.abs(own.std(axis=0) / scale - 1.0).max() < 5.0 / np.sqrt(len(own))
+    assert start.jumped.all()
+
+
+def test_starts_without_memory_are_spread_by_the_clusters_weights(model: BehaviourModel) -> None:
+    forgetful = model.with_automaton(dataclasses.replace(model.making.settings, memory=0))
+    start = start_states(np.random.default_rng(3), forgetful, MANY)
+    found = np.hstack([start.values, start.velocities])
+    weights, means = model.dynamics.weights, model.dynamics.means
+    between = (means - weights @ means).T * weights @ (means - weights @ means)
+    whole = between + np.einsum("k,kij->ij", weights, model.dynamics.covariances)
+    scale = np.sqrt(np.diag(whole))
+    assert np.abs((found.mean(axis=0) - weights @ means) / scale).max() < 5.0 / np.sqrt(MANY)
+    assert np.abs((np.cov(found.T) - whole) / np.outer(scale, scale)).max() < 10.0 / np.sqrt(MANY)
+
+
+def test_a_particle_has_jumped_where_its_cluster_is_another(model: BehaviourModel) -> None:
+    labels = model.automaton.last_symbols
+    states = np.repeat(np.flatnonzero(labels >= 0), 20)
+    features = model.dynamics.means[labels[states]]
+    start = states, features[:, :4], features[:, 4:]
+    moved = propagate(np.random.default_rng(0), model, *start, 0.0, automaton_share=1.0)
+    np.testing.assert_array_equal(moved.jumped, labels[moved.states] != labels[states])
+    assert set(labels[states[moved.jumped]]) == set(range(model.clusters))
+    stayed = ~moved.jumped
+    wanted = np.hstack([features[:, :4] + features[:, 4:], features[:, 4:]])[stayed]
+    np.testing.assert_allclose(np.hstack([moved.values, moved.velocities])[stayed], wanted)
+    # Before there is a history the likeliest cluster is where a particle is.
+    nowhere = np.zeros(model.clusters, dtype=np.int64)
+    means = model.dynamics.means
+    moved = propagate(
+        np.random.default_rng(0), model, nowhere, means[:, :4], means[:, 4:], 0.0, automaton_share=1.0
+    )
+    before = model.mixture.labels(model.reduction.reduced(means))
+    np.testing.assert_array_equal(moved.jumped, labels[moved.states] != before)
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_states_of_known_poses(model: BehaviourModel, known: bool) -> None:
     features = model.dynamics.means[2]

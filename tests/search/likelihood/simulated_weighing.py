@@ -23,6 +23,8 @@ SCENES = {
 }
 """Body, poses, and the weighting's knobs. The last one's union does not fit the words that are kept at once."""
 FEW_WORDS = 6
+FEW_POSES = 2
+"""Sent at once: five go in three parts."""
 
 
 def scene_of(name):
@@ -68,11 +70,12 @@ def wait_politely():
 
 if __name__ == "__main__":
     wait_politely()
+    from studio.search.likelihood import device_weighing, device_weighing_kernels
+
+    device_weighing.POSES_AT_ONCE = FEW_POSES
     found = {}
     for scene in SCENES:
         if scene == "in bands":
-            from studio.search.likelihood import device_weighing_kernels
-
             device_weighing_kernels.WORDS = FEW_WORDS
         found |= {f"{scene}.{key}": value for key, value in terms_of(scene, "gpu").items()}
     np.savez(sys.argv[1], **found)

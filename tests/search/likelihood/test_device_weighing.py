@@ -12,20 +12,23 @@ import numpy as np
 import pytest
 from simulated_card import run_simulated
 from simulated_weighing import FEW_WORDS, SAMPLES, SCENES, scene_of, terms_of
-from weighting_scene import four_cameras
+from weighting_scene import four_cameras, smooth_evidence
 
 from studio.body.catalogue import load_body
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.errors import BodyError, StudioError
 from studio.foundations.geometry.camera_table import camera_table, outward_limit
 from studio.operations.jobs.batch import track_to_end
 from studio.runs.new_run import prepare_run
-from studio.search.likelihood import edge_region
+from studio.search.likelihood import device_weighing, edge_region
 from studio.search.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
 from studio.search.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
     EdgeRegionSilhouetteSettings,
 )
+from studio.search.likelihood.outlines import OutlineProjector
 from studio.search.likelihood.problem import TRUNK_FIRST, WHOLE_BODY
+from studio.search.likelihood.silhouette_areas import Silhouettes
 from studio.sessions.samples import install_sample
 from studio.sessions.workspace import Workspace
 
@@ -247,6 +250,105 @@ def test_a_card_that_fails_leaves_auto_to_the_processor_which_says_why_once(monk
     with pytest.raises(StudioError, match=re.escape(why)) as caught:
         asked_for.log_likelihood(poses)
     assert "device to cpu" in caught.value.hint
+
+
+@pytest.mark.parametrize("count", [1, 63, 64, 65, 200])
+def test_poses_are_made_narrower_or_refused(count):
+    poses, narrower = np.random.default_rng(0).normal(size=(count, 3)), np.zeros((count, 3), np.float32)
+    device_weighing.narrow(poses, narrower)
+    np.testing.assert_array_equal(narrower, poses.astype(np.float32))
+    # The last is finite, but too large for single precision.
+    for wrong in (np.nan, -np.inf, 1e39):
+        for row, column in ((0, 0), (count - 1, 2)):
+            bad = poses.copy()
+            bad[row, column] = wrong
+            with pytest.raises(BodyError, match="not finite"):
+                device_weighing.narrow(bad, narrower)
+
+
+def test_silhouettes_are_rows_of_words():
+    masks = [
+        np.random.default_rng(k).random(shape) < 0.5 for k, shape in enumerate([(5, 70), (9, 32), (4, 31)])
+    ]
+    views = [
+        ViewEvidence(f"c{k}", np.zeros((0, 0, 3), np.uint8), np.where(mask, 255, 0).astype(np.uint8), mask)
+        for k, mask in enumerate(masks)
+    ]
+    pictures = device_weighing.rows_of_words(Silhouettes(FrameEvidence(0, tuple(views))))
+    for picture, mask in zip(pictures, masks, strict=True):
+        height, width = mask.shape
+        assert picture.shape == (height, -(-width // 32))
+        for row, word in np.ndindex(picture.shape):
+            pixels = mask[row, 32 * word : 32 * word + 32]
+            assert int(picture[row, word]) == sum(1 << k for k, pixel in enumerate(pixels) if pixel)
+
+
+@pytest.fixture
+def weighing(monkeypatch):
+    """The part of a card's memory in which human31 is weighed in four cameras, without kernels."""
+    monkeypatch.setattr(device_weighing, "cuda", Card)
+    projector = OutlineProjector.of_body(load_body("human31"), four_cameras())
+    monkeypatch.setattr(device_weighing, "terms_kernel", lambda *_: None)
+    monkeypatch.setattr(device_weighing, "frames_kernel", lambda joints: (None, 32))
+    return device_weighing.WeighingDevice(projector.program, projector.camera_table, (2, 1), areas=True)
+
+
+def test_what_a_card_is_given_once_is_kept(weighing):
+    assert weighing.samples(10) == (16 * 2 * 2 * 10, 16 * 3 * 1 * 10)
+    assert weighing.samples(3) == (16 * 2 * 2 * 3, 16 * 3 * 1 * 10)
+    np.testing.assert_array_equal(weighing.edges_of(None), np.arange(10))
+    chosen = weighing.edges_of(np.array([1, 7]))
+    np.testing.assert_array_equal(chosen, [1, 7])
+    assert weighing.edges_of(np.array([1, 7])) is chosen
+    assert weighing.constant(1.0, 2.5) is weighing.constant(1.0, 2.5)
+    np.testing.assert_array_equal(weighing.constant(1.0, 2.5), [1.0, 2.5])
+    one = weighing.memory("a", (2, 3), np.float32)
+    assert one.shape == (2, 3)
+    assert weighing.memory("a", (2, 3), np.float32) is one
+    for other in (("b", (2, 3), np.float32), ("a", (3, 2), np.float32), ("a", (2, 3), np.int32)):
+        assert weighing.memory(*other) is not one
+
+
+def test_arrays_are_lent_to_one_at_a_time(weighing):
+    class Borrower:
+        pass
+
+    first, second = Borrower(), Borrower()
+    arrays = weighing.lend_arrays(first)
+    assert weighing.lend_arrays(second) is not arrays
+    del first
+    assert weighing.lend_arrays(Borrower()) is arrays
+
+
+def test_problems_lie_one_after_another_on_a_card(weighing):
+    """Maps, silhouettes and where they begin; a frame that is gone leaves its memory to the next."""
+    given = []
+    for seed in (3, 4):
+        evidence = smooth_evidence(four_cameras(), seed)
+        given.append((edge_region.weighting_maps(evidence), Silhouettes(evidence, "half")))
+    frame = weighing.frames(given)
+    assert frame.scale == 0.5
+    places = np.array(frame.places)
+    assert places.shape == (2, 4, 9)
+    for number, (maps, silhouettes) in enumerate(given):
+        pictures = device_weighing.rows_of_words(silhouettes)
+        np.testing.assert_array_equal(frame.observed[number], silhouettes.pixels)
+        for view, (row, picture) in enumerate(zip(places[number], pictures, strict=True)):
+            width, height = maps.views[view, 2:]
+            assert tuple(row[2:4]) == (width, height)
+            for kind in range(2):
+                own = maps.values[maps.views[view, kind] :][: width * height + 2]
+                np.testing.assert_array_equal(frame.values[row[kind] :][: len(own)], own)
+            assert row[5] == picture.shape[1]
+            np.testing.assert_array_equal(frame.words[row[4] :][: picture.size], picture.ravel())
+            assert tuple(row[6:]) == (*silhouettes.sizes[view], silhouettes.pixels[view])
+    there = frame.values
+    assert weighing.frames(given).values is not there
+    del frame
+    later = weighing.frames(given[::-1])
+    assert later.values is there
+    # Without silhouettes the scale is that of the pictures.
+    assert weighing.frame(given[0][0]).scale == 1.0
 
 
 def test_a_run_stores_why_it_does_without_a_card(no_device, tmp_path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from weighting_scene import CENTRE, looking_at, plain_evidence, scattered
+from weighting_scene import CENTRE, looking_at, on_grid, plain_evidence, scattered
 
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import kinematic_tables
@@ -11,7 +11,7 @@ from studio.search.likelihood.bodytrack import BodytrackLikelihood, BodytrackSet
 from studio.search.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
 from studio.search.likelihood.edge_region_silhouette import EdgeRegionSilhouetteSettings
 from studio.search.likelihood.edge_silhouette import EdgeSilhouetteLikelihood, EdgeSilhouetteSettings
-from studio.search.likelihood.overlay import overlay_points
+from studio.search.likelihood.overlay import limb_contours, overlay_points, sample_points
 from studio.search.likelihood.template import TemplateSettings
 
 
@@ -91,6 +91,43 @@ def test_outlines_and_contours_lie_on_the_cones(human, ring):
 
 def _unit(vector):
     return vector / np.linalg.norm(vector)
+
+
+def test_contours_follow_side_a_the_far_end_side_b_and_the_near_end(human, ring):
+    pose = scattered(human, 1)[0]
+    views = overlay_points(human, ring, pose, EdgeRegionSettings())
+    for view, alone in zip(views, limb_contours(human, ring, pose), strict=True):
+        for contour, again, corners in zip(view.contours, alone, view.outlines, strict=True):
+            np.testing.assert_array_equal(again, contour)
+            # Thirteen points for either end, from one corner to the other, and where it began.
+            assert contour.shape == (28, 2)
+            found = contour[[0, 1, 13, 14, 26, 27]]
+            np.testing.assert_allclose(found, corners[[0, 1, 2, 3, 0, 0]], atol=0.5)
+            away = _unit(corners[1] + corners[2] - corners[0] - corners[3])
+            for end, outwards in ((contour[1:14], away), (contour[14:27], -away)):
+                assert ((end - 0.5 * (end[0] + end[-1])) @ outwards).min() > -1.0
+                assert (end[6] - 0.5 * (end[0] + end[-1])) @ outwards >= 0.0
+
+
+def test_sample_points_lie_where_the_likelihoods_place_them():
+    outline = np.array([[10.0, 20.0], [14.0, 77.0], [31.0, 75.0], [35.0, 21.0]])
+    length = np.linalg.norm(outline[1] - outline[0])
+    # Samples lie in the middles of equal parts: 16 a side, 16 a strip.
+    edge, region = sample_points(outline[None], EdgeRegionSettings())
+    middles = (np.arange(16) + 0.5) / 16
+    sides = [on_grid(outline, middles, np.array([side])) for side in (0.0, 1.0)]
+    np.testing.assert_allclose(edge, np.concatenate(sides))
+    np.testing.assert_allclose(_sorted(region), _sorted(on_grid(outline, middles, np.array([1, 3, 5]) / 6)))
+    # The benchmark's: 57 and 54 pixels are 11 intervals of 5 and 6 or 5 of 10; 25 and 17 in the mean are 4.
+    assert 55.0 < length < 57.5
+    edge, region = sample_points(outline[None], BodytrackSettings())
+    sides = [on_grid(outline, np.arange(12) / 11, np.array([side])) for side in (0.0, 1.0)]
+    np.testing.assert_allclose(edge, np.concatenate(sides))
+    np.testing.assert_allclose(_sorted(region), _sorted(on_grid(outline, np.arange(7) / 6, np.arange(4) / 4)))
+
+
+def _sorted(points):
+    return points[np.lexsort(np.round(points, 6).T)]
 
 
 def test_limbs_that_are_not_seen_are_nan_and_empty(human, ring):
