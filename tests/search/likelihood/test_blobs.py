@@ -120,6 +120,47 @@ def test_blobs_are_learnt_for_so_many_frames_then_kept(body: BodyModel, evidence
     assert informed.divergences(body.neutral[None])[0] < 0.5 * cones.divergences(body.neutral[None])[0]
 
 
+def test_kept_blobs_are_those_of_all_frames_that_were_learnt_from(
+    body: BodyModel, evidence: FrameEvidence
+) -> None:
+    poses, made = scattered(body, 3, frames=0.5), []
+    for frames in (3, 4):
+        settings = dataclasses.replace(SETTINGS, blob_learning=frames)
+        likelihood = BlobLikelihood(body, ring_of_cameras(body), settings)
+        memory: dict[str, Array] = {}
+        for pose in poses:
+            memory = dict(likelihood.problem(evidence).expecting(pose[None], memory).remembered(pose))
+        made.append((memory, likelihood.model(memory)))
+    assert set(made[0][0]) == {"blobs"}
+    assert made[1][0]["blob_frames"].tolist() == [3.0]
+    for field in dataclasses.fields(made[0][1]):
+        one, other = (getattr(model, field.name) for _, model in made)
+        np.testing.assert_array_equal(one, other)
+
+
+def test_without_frames_to_learn_from_the_cones_are_kept(body: BodyModel, evidence: FrameEvidence) -> None:
+    likelihood = BlobLikelihood(body, ring_of_cameras(body), dataclasses.replace(SETTINGS, blob_learning=0))
+    informed = likelihood.problem(evidence).expecting(body.neutral[None], {})
+    assert dict(informed.remembered(body.neutral)) == {}
+    assert informed.model is likelihood.cones
+
+
+def test_a_fit_is_lost_below_the_setting(
+    body: BodyModel, evidence: FrameEvidence, likelihood: BlobLikelihood
+) -> None:
+    memory = likelihood.problem(evidence).expecting(body.neutral[None], {}).remembered(body.neutral)
+    black = [dataclasses.replace(view, mask=np.full_like(view.mask, 255)) for view in evidence.views]
+    full = dataclasses.replace(evidence, views=tuple(black))
+    quality = likelihood.problem(full).expecting(body.neutral[None], memory).quality
+    assert quality < 0.0
+    for share, lost in ((0.99, True), (1.01, False)):
+        settings = dataclasses.replace(SETTINGS, blob_lost=-share * quality)
+        other = BlobLikelihood(body, likelihood.cameras, settings).problem(full)
+        assert other.expecting(body.neutral[None], memory).lost_evidence == lost
+        # Before anything is learnt only an empty hull is lost.
+        assert not other.expecting(body.neutral[None], {}).lost_evidence
+
+
 def test_learnt_blobs_are_the_same_in_another_process(body: BodyModel, evidence: FrameEvidence) -> None:
     poses, memories = scattered(body, 5), []
     for _ in range(2):

@@ -186,6 +186,34 @@ def test_limits_are_inclusive_and_limbs_compared_only_on_request() -> None:
     assert priors.hold(poses, limbs_apart=True).tolist() == [True, False, False, False]
 
 
+def test_every_parameter_has_two_limits_and_a_limit_is_within() -> None:
+    body = load_body("human31")
+    priors = HardPriors(body)
+    for bound, beyond in ((body.lower, -1e-9), (body.upper, 1e-9)):
+        limited = np.flatnonzero(np.isfinite(bound))
+        poses = np.repeat(body.neutral[None], len(limited), axis=0)
+        poses[np.arange(len(limited)), limited] = bound[limited]
+        assert priors.hold(poses).all()
+        poses[np.arange(len(limited)), limited] += beyond
+        assert not priors.hold(poses).any()
+
+
+def test_limbs_are_apart_whatever_the_limits_but_not_in_poses_that_are_none() -> None:
+    body = _body()
+    priors, poses = HardPriors(body), np.repeat(body.neutral[None], 5, axis=0)
+    place = [entry.name for entry in body.parameters].index("pelvis_x")
+    poses[0, place], poses[1, place], poses[2, place] = np.inf, -np.inf, np.nan
+    poses[3, [entry.name for entry in body.parameters].index("left_knee_ry")] = body.upper.max() + 7.0
+    assert priors.apart(poses[[0, 1, 2, 4]]).tolist() == [False, False, False, True]
+    assert not priors.hold(poses[3:4])
+    # Poses that are no poses change nothing for the others.
+    others = _around(body, 40, 0.3, 2)
+    mixed = np.insert(others, [0, 7, 16, 17, 40], poses[0], axis=0)
+    kept = np.isfinite(mixed).all(axis=1)
+    np.testing.assert_array_equal(priors.apart(mixed)[kept], priors.apart(others))
+    assert not priors.apart(mixed)[~kept].any()
+
+
 def test_poses_of_another_body_are_refused() -> None:
     with pytest.raises(BodyError, match="31 parameters"):
         HardPriors(load_body("human31")).hold(np.zeros((2, 30)))

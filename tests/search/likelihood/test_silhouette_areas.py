@@ -15,7 +15,14 @@ from studio.footage.capture.pictures import read_picture
 from studio.foundations.geometry.camera import Camera
 from studio.search.likelihood.outline_kernels import LANES
 from studio.search.likelihood.outlines import OutlineProjector
-from studio.search.likelihood.silhouette_areas import BLOCKS_A_THREAD, FULL, HALF, Silhouettes, halved
+from studio.search.likelihood.silhouette_areas import (
+    BLOCKS_A_THREAD,
+    FULL,
+    HALF,
+    Silhouettes,
+    halved,
+    silhouettes_of,
+)
 
 SCALES = {FULL: 1.0, HALF: 0.5}
 
@@ -97,6 +104,25 @@ def test_a_limb_right_across_the_picture():
         masks = speckled((camera,))
         compare_with_oracle(body, (camera,), masks, scattered(body, 30, spread=20.0), FULL)
         compare_with_oracle(body, (camera,), masks, scattered(body, 30, spread=20.0), HALF)
+
+
+@pytest.mark.parametrize("resolution", [FULL, HALF])
+def test_a_mask_is_silhouette_from_half_of_its_values_on(resolution):
+    mask = np.full((6, 8), 127, np.uint8)
+    mask[2:4, 4:8] = 128
+    found = Silhouettes(with_masks([mask]), resolution)
+    assert found.scale == SCALES[resolution]
+    np.testing.assert_array_equal(found.pixels, [8 * SCALES[resolution] ** 2])
+    np.testing.assert_array_equal(found.sizes, [[8 * SCALES[resolution], 6 * SCALES[resolution]]])
+
+
+def test_a_frames_silhouettes_are_made_once_for_each_resolution():
+    evidence, other = (with_masks(speckled(four_cameras())) for _ in range(2))
+    half = silhouettes_of(evidence, HALF)
+    assert silhouettes_of(evidence, HALF) is half
+    assert silhouettes_of(evidence, FULL).scale == 1.0
+    assert silhouettes_of(evidence, HALF) is half
+    assert silhouettes_of(other, HALF) is not half
 
 
 def test_half_a_mask_is_the_majority_of_each_four():
