@@ -59,6 +59,35 @@ def test_whole_turns_are_taken_out_within_and_between_recordings() -> None:
     np.testing.assert_allclose(space.features(wrapped + 4.0 * math.pi), space.features(poses), atol=1e-12)
 
 
+def test_two_frames_have_features() -> None:
+    body = load_body("planar_arm4")
+    poses = np.array([body.neutral, body.neutral + 0.1])
+    features = feature_space(body, 30.0).features(poses)
+    np.testing.assert_allclose(features, np.hstack([poses, np.full((2, 4), 0.1)]))
+
+
+def test_turns_are_taken_out_towards_the_middle_of_the_limits() -> None:
+    body = load_body("human25")
+    space = feature_space(body, 30.0)
+    entries = [body.parameters[column] for column in space.columns]
+    middle = np.array([(entry.lower + entry.upper) / 2.0 for entry in entries])
+    limited = np.isfinite(middle)
+    np.testing.assert_allclose(space.middle[limited], middle[limited])
+    np.testing.assert_array_equal(space.middle[~limited], body.neutral[space.columns][~limited])
+    poses = np.repeat(body.neutral[None], 3, axis=0)
+    # Half a turn on either side of the middle stays, and what is farther comes nearer by whole turns.
+    for away, wanted in ((3.1, 3.1), (-3.1, -3.1), (3.2, 3.2 - 2.0 * math.pi), (-9.5, -9.5 + 4.0 * math.pi)):
+        poses[:, space.columns] = space.middle + away
+        found = space.continuous(poses) - space.middle
+        np.testing.assert_allclose(found, wanted)
+
+
+def test_an_endless_frame_rate_is_none() -> None:
+    for rate in (-1.0, math.inf, math.nan):
+        with pytest.raises(BehaviourError, match="frame rate"):
+            feature_space(load_body("human25"), rate)
+
+
 def test_errors_name_the_cause() -> None:
     body = load_body("human25")
     space = feature_space(body, 30.0)

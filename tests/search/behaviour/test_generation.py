@@ -126,7 +126,22 @@ def test_a_path_that_ends_restarts() -> None:
     }
 
 
+def test_the_shortest_motion_and_the_last_state_are_allowed(model: BehaviourModel) -> None:
+    poses, states = generate(np.random.default_rng(0), model, 2, start=model.states - 1)
+    assert poses.shape == (2, 4)
+    assert states[0] == model.states - 1
+
+
+def test_a_single_frame_is_its_clusters_mean(model: BehaviourModel) -> None:
+    found = likeliest_motion(model.dynamics, np.array([2]))
+    np.testing.assert_array_equal(found, model.dynamics.means[2:3, :4])
+
+
 def test_refusals(model: BehaviourModel) -> None:
+    with pytest.raises(BehaviourError, match="no state -1"):
+        generate(np.random.default_rng(0), model, 10, start=-1)
+    with pytest.raises(BehaviourError, match=f"no state {model.states}"):
+        generate(np.random.default_rng(0), model, 10, start=model.states)
     with pytest.raises(BehaviourError, match="1 frames"):
         generate(np.random.default_rng(0), model, 1)
     with pytest.raises(BehaviourError, match="no state 9999"):

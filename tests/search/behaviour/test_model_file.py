@@ -108,6 +108,22 @@ def test_arrays_that_do_not_fit_each_other_are_refused(model: BehaviourModel, tm
     assert read_model(path).automaton.next_state[1, 0] == model.states - 1
 
 
+def test_what_an_older_head_has_not_is_as_if_it_were_not_used(model: BehaviourModel, tmp_path: Path) -> None:
+    path = tmp_path / "older.behaviour"
+    write_model(replace(model, automaton=replace(model.automaton, smoothing=0.02, back_off=0.3)), path)
+    arrays = arrays_of(path)
+    head = json.loads(arrays.pop("head").tobytes())
+    for name in ("kept", "smoothing", "back_off", "sources", "entropy_train", "entropy_test", "heading"):
+        del head[name]
+    with path.open("wb") as file:
+        np.savez(file, head=np.frombuffer(json.dumps(head).encode(), dtype=np.uint8), **arrays)
+    back = read_model(path)
+    assert (back.automaton.smoothing, back.automaton.back_off, back.reduction.kept) == (0.0, 0.0, 1.0)
+    assert back.making.sources == ()
+    assert np.isnan(back.making.entropy_train)
+    assert np.isnan(back.making.entropy_test)
+
+
 def test_a_model_of_before_the_floors_has_clusters_without_one(model: BehaviourModel, tmp_path: Path) -> None:
     path = tmp_path / "old.behaviour"
     write_model(model, path)

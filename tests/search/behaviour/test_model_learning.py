@@ -79,6 +79,14 @@ def test_another_rate_scales_the_derivatives(model: BehaviourModel) -> None:
     np.testing.assert_allclose(
         double.dynamics.covariances[:, :4, 4:], model.dynamics.covariances[:, :4, 4:] / 2.0
     )
+    np.testing.assert_allclose(double.prototypes.derivatives, model.prototypes.derivatives / 2.0)
+    np.testing.assert_array_equal(double.prototypes.poses, model.prototypes.poses)
+    # The same motion has the same place in the reduced space.
+    factor = np.repeat([1.0, 0.5], 4)
+    features = model.dynamics.means
+    np.testing.assert_allclose(
+        double.reduction.reduced(features * factor), model.reduction.reduced(features), atol=1e-12
+    )
     assert model.at_rate(0.5).steps_per_frame == pytest.approx(FPS / 0.5)
     for none in (0.0, -25.0, np.inf):
         with pytest.raises(BehaviourError, match="no frame rate"):
