@@ -9,18 +9,28 @@ Not here: behaviour models, redrawn or rejected poses and limbs kept apart, whic
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studio.foundations.arrays import Array
 from studio.search.likelihood.device_weighing import (
     ProblemOnDevice,
     WeighingDevice,
 )
-from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Moment, kernel, limits_there
+from studio.search.trackers.device_runs import (
+    RECORDED,
+    THREADS,
+    DeviceRuns,
+    Launched,
+    LayersAhead,
+    Moment,
+    kernel,
+    limits_there,
+)
 from studio.search.trackers.device_search_kernels import (
     ANNEALED,
     BETA,
@@ -37,6 +47,7 @@ from studio.search.trackers.device_search_kernels import (
     SUMMING,
     SURVIVAL,
     SURVIVING,
+    UTMOST,
     WANTED,
     WEIGHED,
     WEIGHTED,
@@ -59,11 +70,12 @@ CARRIED = {"weighted": 0, "resampled": 1, "mode": 2}
 @dataclass(frozen=True, slots=True, eq=False)
 class DeviceSet:
     """Particles of R runs there: poses (D, R N), of `count` = N a run. cumulated : weights (R N,).
-    weights : (2, R N) fitness and log-weights; None: not weighed. annealed : (R, 5).
+    weights : (2, R N) fitness and log-weights; None: not weighed. annealed : (R, 5). turn : which of two places it has.
     """
 
     poses: Any
     count: int
+    turn: int = 0
     cumulated: Any = None
     weights: Any = None
     annealed: Any = None
@@ -71,7 +83,7 @@ class DeviceSet:
 
 class DeviceFilter(DeviceRuns):
     """R runs of one body, side by side. A weighed set that it returns is valid until the next is weighed, another until
-    the next but one is made.
+    one is made from a set that was made from it.
     """
 
     def __init__(
@@ -97,7 +109,7 @@ class DeviceFilter(DeviceRuns):
         cumulated = np.concatenate([np.cumsum(np.exp(one.log_weights)) for one in sets])
         there = self._memory("last poses", poses.shape[::-1], np.float32)
         self.device.bring(np.ascontiguousarray(poses, np.float64), there)
-        return DeviceSet(there, len(sets[0].poses), self._copied("last weights", cumulated))
+        return DeviceSet(there, len(sets[0].poses), cumulated=self._copied("last weights", cumulated))
 
     def begin(
         self,
@@ -116,7 +128,7 @@ class DeviceFilter(DeviceRuns):
         keys, dials = self._uploaded(moments, [LayerPlan(1.0, Noise(sigma)) for sigma in sigmas])
         moved = self._copied("shift", np.zeros((self.runs, size)) if shift is None else shift)
         carried = self._memory("carried", (size, whole), np.float32)
-        poses = self._next_poses(count)
+        poses = self._poses(count, 0)
         grid = -(-whole // THREADS), THREADS, self._stream
         kernel("carry_over")[grid](
             last.poses, last.count, last.cumulated, keys, CARRIED[carry], systematic, moved, count, carried
@@ -145,7 +157,8 @@ class DeviceFilter(DeviceRuns):
         parents = self._memory("parents", (2, whole), np.int32)
         every = count if len(problem.frame.observed) > 1 else whole
         edges = self.device.edges_of(None)
-        poses = given.poses if noise is None else self._next_poses(count)
+        turn = 1 - given.turn
+        poses = given.poses if noise is None else self._poses(count, turn)
         grid = -(-whole // THREADS), THREADS, self._stream
         blocks = (size, self.runs), SUMMING, self._stream
         found = self._moments
@@ -173,55 +186,85 @@ class DeviceFilter(DeviceRuns):
         correlated = noise is not None and noise.correlated
         place = id(given.poses), id(poses), problem.frame.memory, every
         self._launch((*place, problem.factors, problem.frame.scale, count, correlated, systematic), launch)
-        weighed = DeviceSet(given.poses, count, cumulated, weights, annealed)
-        return weighed, weighed if noise is None else DeviceSet(poses, count)
+        weighed = DeviceSet(given.poses, count, given.turn, cumulated, weights, annealed)
+        return weighed, weighed if noise is None else DeviceSet(poses, count, turn)
 
     def records(self, weighed: DeviceSet, plans: Sequence[LayerPlan], layer: int) -> list[LayerRecord]:
         """The records of all runs' layer, which `step` has just done."""
-        count, is_last = weighed.count, plans[0].noise is None
+        return self.send(weighed, layer, [plan.survival for plan in plans], is_last=plans[0].noise is None)()
+
+    def send(
+        self,
+        weighed: DeviceSet,
+        layer: int,
+        wanted: Sequence[float],
+        *,
+        is_last: bool,
+        also: Mapping[str, Any] | None = None,
+    ) -> Callable[[], list[LayerRecord]]:
+        """Send the records of all runs' layer, which was launched last, to the host: what waits for them there.
+        wanted : the share that was to survive, of each run. also : arrays that are sent with them.
+        """
+        count = weighed.count
         step = -(-count // RECORDED)
-        poses, values, best = self._rows(weighed.poses, weighed.weights, weighed.annealed, count, step)
-        annealed, moments = self._fetched(weighed.annealed), self._fetched(self._moments)
-        parents = np.zeros((2, 0), dtype=np.int64)
+        sent = self._rows(weighed.poses, weighed.weights, weighed.annealed, count, step)
+        sent |= {"annealed": weighed.annealed, "moments": self._moments}
         if not is_last:
-            parents = self._fetched(self._memory("parents", (2, self.runs * count), np.int32)).astype(
-                np.int64
-            )
+            sent["parents"] = self._memory("parents", (2, self.runs * count), np.int32)
+        on_the_way = self._send(sent | dict(also or {}))
+        return lambda: self._records_of(on_the_way.arrive(), count, step, layer, wanted)
+
+    def _records_of(
+        self, sent: Mapping[str, NDArray[Any]], count: int, step: int, layer: int, wanted: Sequence[float]
+    ) -> list[LayerRecord]:
+        annealed, moments = sent["annealed"], sent["moments"]
+        poses, values, is_last = sent["rows"], sent["values"], "parents" not in sent
         rows = np.arange(0, count, step) if step > 1 else np.zeros(0, dtype=np.int64)
         kept = moments[WEIGHTED + 1]
+        drawn = [np.zeros((2, 0), dtype=np.int64)] * self.runs
+        if not is_last:
+            drawn = np.split(sent["parents"].astype(np.int64), self.runs, axis=1)
         return [
             LayerRecord(
                 layer=layer,
                 beta=float(annealed[run, BETA]),
-                alpha_wanted=plan.survival,
+                alpha_wanted=alpha,
                 alpha_reached=float(annealed[run, SURVIVAL]),
                 variance_weighed=moments[WEIGHED + 1, run],
                 variance_resampled=kept[run] if is_last else moments[SURVIVING + 1, run],
                 variance_diffused=kept[run] if is_last else moments[DIFFUSED + 1, run],
-                best=best[run],
+                best=poses[run, -1],
                 best_log_weight=float(annealed[run, MOST]),
                 mean=moments[WEIGHTED, run],
-                poses=poses[run],
-                log_weights=values[LOG_WEIGHT, run],
-                parents=parents if is_last else parents[:, run * count : (run + 1) * count],
+                poses=poses[run, :-1],
+                log_weights=values[LOG_WEIGHT, run, :-1],
+                parents=parents,
                 rows=rows,
             )
-            for run, plan in enumerate(plans)
+            for run, (alpha, parents) in enumerate(zip(wanted, drawn, strict=True))
         ]
 
     def give(self, there: DeviceSet) -> list[ParticleSet]:
         """All runs' particles on the host, with their weights where they have been weighed."""
         if there.weights is None:
             equal = np.full(there.count, -math.log(there.count))
-            poses = np.split(self._fetched(there.poses).T.astype(np.float64), self.runs)
-            return [ParticleSet(np.ascontiguousarray(own), equal) for own in poses]
-        poses, values, _ = self._rows(there.poses, there.weights, there.annealed, there.count, 1)
+            return [ParticleSet(own, equal) for own in self._given(there.poses)]
+        taken = self._rows(there.poses, there.weights, there.annealed, there.count, 1)
+        poses, values = (
+            self._fetched(taken["rows"])[:, :-1],
+            self._fetched(taken["values"])[LOG_WEIGHT, :, :-1],
+        )
         given = list[ParticleSet]()
         for own, raw, (beta, _, most, total, _) in zip(
-            poses, values[LOG_WEIGHT], self._fetched(there.annealed), strict=True
+            poses, values, self._fetched(there.annealed), strict=True
         ):
             given.append(ParticleSet(own, -beta * (most - raw) - math.log(total), raw))
         return given
+
+    def _given(self, poses: Any) -> list[Array]:  # noqa: ANN401
+        """Poses (D, R N) there as each run's (N, D) on the host."""
+        runs = np.split(self._fetched(poses).T.astype(np.float64), self.runs)
+        return [np.ascontiguousarray(own) for own in runs]
 
     def means(self) -> Array:
         """(R, D) weighted means (Eq. 8) of the layer last done, where it was measured."""
@@ -232,7 +275,8 @@ class DeviceFilter(DeviceRuns):
         keys = np.array([tuple(moment) for moment in moments], dtype=np.uint64)
         rows = np.zeros((self.runs, SIGMA + size))
         for row, one in zip(rows, plans, strict=True):
-            row[WANTED], row[KNOWN], row[CROSSED] = one.survival, one.beta, one.crossed
+            row[WANTED], row[KNOWN], row[UTMOST] = one.survival, one.beta, math.inf
+            row[CROSSED] = one.crossed
             if one.noise is not None:
                 own = one.noise.sigma is None
                 row[KEPT], row[SCALE] = one.noise.kept, one.noise.scale
@@ -241,10 +285,8 @@ class DeviceFilter(DeviceRuns):
         return self._copied("keys", keys), self._copied("dials", rows)
 
 
-class DeviceSearch:
-    """Searches of one frame on a device, a layer at a time, for `frame_loop`. evaluated : poses of each that the last
-    layer weighed.
-    """
+class DeviceSearch(LayersAhead[DeviceSet]):
+    """Searches of one frame by a filter on a device, for `frame_loop`."""
 
     def __init__(
         self,
@@ -253,14 +295,12 @@ class DeviceSearch:
         spaces: Sequence[SearchSpace],
         settings: Any,  # noqa: ANN401
     ) -> None:
-        """spaces : of the runs, which differ in σ0 alone. settings : those that the frame begins with."""
-        self.evaluated = 0
-        self._tracker, self._spaces = tracker, spaces
-        self._problem = problem
+        """settings : those that the frame begins with."""
+        super().__init__(tracker, spaces)
+        self._filter_kind, self._problem = tracker, problem
         by_limbs = getattr(settings, "crossover_by", "limbs") == "limbs"
         clamped = settings.constraints == "clamp"
         self._filter = DeviceFilter(problem.device, spaces[0], len(spaces), by_limbs, clamped)
-        self._set: DeviceSet | None = None
         self._extras = list[Arrays]()
 
     def begin(
@@ -291,24 +331,6 @@ class DeviceSearch:
         """Go on from sets of the host."""
         self._set, self._extras = self._filter.take(sets), [one.extra for one in sets]
 
-    def step(self, layer: int, numbers: Sequence[RandomNumbers], settings: Any) -> list[LayerRecord]:  # noqa: ANN401
-        """Do a layer and return its records."""
-        assert self._set is not None
-        plans = list[LayerPlan]()
-        for space, extra in zip(self._spaces, self._extras, strict=True):
-            plan = self._tracker.plan_layer(layer, space, settings, extra)
-            assert plan is not None
-            plans.append(plan)
-        moments, systematic = [Moment(*one.key) for one in numbers], settings.resampling == "systematic"
-        weighed, self._set = self._filter.step(self._set, self._problem, moments, plans, systematic)
-        self.evaluated = weighed.count
-        records = self._filter.records(weighed, plans, layer)
-        self._extras = [
-            self._tracker.kept_of_layer(extra, record, settings)
-            for extra, record in zip(self._extras, records, strict=True)
-        ]
-        return records
-
     def particles(self) -> list[ParticleSet]:
         """The sets that the next layer weighs, or the last layer's with their weights, on the host."""
         assert self._set is not None
@@ -316,3 +338,28 @@ class DeviceSearch:
             ParticleSet(there.poses, there.log_weights, there.raw_log_weights, extra)
             for there, extra in zip(self._filter.give(self._set), self._extras, strict=True)
         ]
+
+    def _launch(
+        self,
+        given: DeviceSet,
+        layer: int,
+        moments: Sequence[Moment],
+        settings: Any,  # noqa: ANN401
+    ) -> Launched[DeviceSet]:
+        plans = list[LayerPlan]()
+        for space, extra in zip(self._spaces, self._extras, strict=True):
+            plan = self._filter_kind.plan_layer(layer, space, settings, extra)
+            assert plan is not None
+            plans.append(plan)
+        systematic = settings.resampling == "systematic"
+        weighed, following = self._filter.step(given, self._problem, moments, plans, systematic)
+        wanted, is_last = [plan.survival for plan in plans], plans[0].noise is None
+        sent = self._filter.send(weighed, layer, wanted, is_last=is_last)
+        return Launched(following, given.count, sent)
+
+    def _heed(self, records: Sequence[LayerRecord], settings: Any) -> bool:  # noqa: ANN401
+        before, kind = self._extras, self._filter_kind
+        self._extras = [
+            kind.kept_of_layer(extra, record, settings) for extra, record in zip(before, records, strict=True)
+        ]
+        return any(one is not other for one, other in zip(before, self._extras, strict=True))

@@ -29,10 +29,10 @@ BETA, SURVIVAL, MOST, TOTAL, BEST = range(5)
 ANNEALED = 5
 """Numbers of an annealed layer: β, the survival rate reached, the largest log-weight, the sum of what follows from the
 others, and which particle weighs most."""
-WANTED, KNOWN, CROSSED, KEPT, SCALE, OF_SAMPLE, CORRELATED, SIGMA = range(8)
-"""Dials of a run in a layer: share that is to survive; β where that is given, else NaN; share of children; how far
-particles stay from the mean when noise is added, what all noise is multiplied by, whether its deviations are the
-sample's, and whether it is correlated; the first of the standard deviations σ (D,)."""
+WANTED, KNOWN, UTMOST, CROSSED, KEPT, SCALE, OF_SAMPLE, CORRELATED, SIGMA = range(9)
+"""Dials of a run in a layer: share that is to survive; β where that is given, else NaN; what it is at most; share of
+children; how far particles stay from the mean when noise is added, what all noise is multiplied by, whether its
+deviations are the sample's, and whether it is correlated; the first of the standard deviations σ (D,)."""
 WEIGHED, WEIGHTED, SURVIVING, DIFFUSED, MOMENTS = 0, 2, 4, 6, 8
 """Rows of a layer's moments (8, R, D), each a mean and the variance in the row after it: of the set as it was weighed,
 by its weights, of the survivors, of the next set."""
@@ -80,10 +80,10 @@ def weight_of(cumulated, first, n):
 
 
 def anneal_weights(weights, count, dials, annealed, cumulated):
-    """β with which a share WANTED of each run's particles survives (Eq. 3, 11, 12), or KNOWN where that is a number;
-    the weights cumulated (R N,).
+    """β with which a share WANTED of each run's particles survives (Eq. 3, 11, 12), at most UTMOST, or KNOWN where that
+    is a number; the weights cumulated (R N,).
 
-    weights : (2, R N). dials : (R, 7 + D). annealed : (R, 5). A block of SUMMING threads for each run.
+    weights : (2, R N). dials : (R, 8 + D). annealed : (R, 5). A block of SUMMING threads for each run.
     """
     run, thread = cuda.blockIdx.x, cuda.threadIdx.x
     first = run * count
@@ -162,6 +162,7 @@ def anneal_weights(weights, count, dials, annealed, cumulated):
                     break
                 step = at - excess / slope if slope < 0.0 else math.inf
                 at = step if low < step < high else 0.5 * (low + high)
+        beta = min(beta, dials[run, UTMOST])
     own = (count + SUMMING - 1) // SUMMING
     begin, end = min(thread * own, count), min((thread + 1) * own, count)
     mine, mine_squared = 0.0, 0.0
@@ -219,7 +220,7 @@ def carry_over(last, before, cumulated, keys, how, systematic, shift, count, pos
 def draw_survivors(poses, cumulated, keys, count, systematic, dials, place, survivors, parents):
     """Survivors drawn by weight with replacement (step 4), some of them children of two (Eq. 19).
 
-    dials : (R, 7 + D). place : (D,) number of each parameter's limb, from 1. survivors : (D, R N) and
+    dials : (R, 8 + D). place : (D,) number of each parameter's limb, from 1. survivors : (D, R N) and
     parents (2, R N), to be filled.
     """
     at = cuda.grid(1)
@@ -333,7 +334,7 @@ def find_root(correlations):
 def spread(centres, moments, root, dials, keys, limits, count, poses):
     """Centres (D, R N) with noise, set on the limits where these are passed (Eq. 7, 9, 13, 18).
 
-    moments : (8, R, D), of which the survivors' are read. root : (R, D, D), see `find_root`. dials : (R, 7 + D).
+    moments : (8, R, D), of which the survivors' are read. root : (R, D, D), see `find_root`. dials : (R, 8 + D).
     limits : (2, D). poses : filled.
     """
     at = cuda.grid(1)

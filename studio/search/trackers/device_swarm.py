@@ -8,7 +8,8 @@ others it is searched as alone. Symbols and equations are those of `particle_swa
 Not here: behaviour models, rejected poses and limbs kept apart, which the processor's search has.
 """
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,16 @@ from numpy.typing import NDArray
 from studio.foundations.arrays import Array
 from studio.search.likelihood.device_weighing import ProblemOnDevice, WeighingDevice
 from studio.search.likelihood.problem import TRUNK_FIRST
-from studio.search.trackers.device_runs import RECORDED, THREADS, DeviceRuns, Moment, kernel, limits_there
+from studio.search.trackers.device_runs import (
+    RECORDED,
+    THREADS,
+    DeviceRuns,
+    Launched,
+    LayersAhead,
+    Moment,
+    kernel,
+    limits_there,
+)
 from studio.search.trackers.device_search_kernels import (
     DIFFUSED,
     MOST,
@@ -73,7 +83,7 @@ class SwarmStep:
 class DeviceSwarmSet:
     """Particles of R runs there, `count` = N a run: places, velocities and bests (D, R N), reached (2, R N); leaders
     and starts (D, R), standing (R, 5), see `device_swarm_kernels`. weights : (2, R N) of places, of whose rows `row` is
-    f; None: not weighed.
+    f; None: not weighed. turn : which of two places the particles have.
     """
 
     count: int
@@ -86,11 +96,12 @@ class DeviceSwarmSet:
     standing: Any
     weights: Any = None
     row: int = 0
+    turn: int = 0
 
 
 class DeviceSwarm(DeviceRuns):
-    """R runs of one body, side by side. A set that it returns has the places that it had then until the next but one is
-    made; its bests and leaders are those of the last weighing.
+    """R runs of one body, side by side. A set that it returns has the places that it had then until a set is made from
+    one that was made from it; its bests and leaders are those of the last weighing.
     """
 
     def __init__(self, device: WeighingDevice, space: SearchSpace, runs: int = 1) -> None:
@@ -102,7 +113,7 @@ class DeviceSwarm(DeviceRuns):
 
     def take(self, sets: Sequence[ParticleSet]) -> DeviceSwarmSet:
         """Swarms of the host, one a run and of as many particles each, there."""
-        there = self._next(len(sets[0].poses))
+        there = self._following(len(sets[0].poses), 0)
 
         def fill(array: Any, values: Sequence[Array], *, placed: bool = True) -> None:  # noqa: ANN401
             joined = np.concatenate([np.atleast_2d(one) for one in values])
@@ -135,7 +146,7 @@ class DeviceSwarm(DeviceRuns):
     ) -> DeviceSwarmSet:
         """A stage's swarms of `count` particles a run, sampled about x̂ (R, D): x ← N(x̂, Σ), v ← U(-σ, σ) or zero."""
         keys, dials = self._uploaded(moments, steps)
-        following = self._next(count)
+        following = self._following(count, 0)
         following.leaders.copy_to_device(np.ascontiguousarray(self._narrowed(starts).T), stream=self._stream)
         self._sample(following, keys, dials, constraints)
         return following
@@ -161,7 +172,7 @@ class DeviceSwarm(DeviceRuns):
         edges = self.device.edges_of(problem.trunk if trunk_first else None)
         every = count if len(problem.frame.observed) > 1 else whole
         weights = self._memory("weights", (2, whole), np.float64)
-        following = given if steps is None else self._next(sampled or count)
+        following = given if steps is None else self._following(sampled or count, 1 - given.turn)
         limits = self._limits[constraints != "ignore"]
         found, blocks = self._moments, ((len(self.space.names), self.runs), SUMMING, self._stream)
 
@@ -189,32 +200,58 @@ class DeviceSwarm(DeviceRuns):
         self._launch(("swarm", *where, *how), launch)
         weighed = DeviceSwarmSet(
             count, given.places, given.velocities, given.bests, given.reached, given.leaders, given.starts,
-            given.standing, weights, problem.ranked,
+            given.standing, weights, problem.ranked, given.turn,
         )  # fmt: skip
         return weighed, weighed if following is given else following
 
     def records(self, weighed: DeviceSwarmSet, layer: int, *, is_last: bool) -> list[LayerRecord]:
         """The records of all runs' layer, which `step` has just done."""
+        return self.send(weighed, layer, is_last=is_last)()
+
+    def send(self, weighed: DeviceSwarmSet, layer: int, *, is_last: bool) -> Callable[[], list[LayerRecord]]:
+        """Send the records of all runs' layer, which was launched last, to the host: what waits for them there."""
         count = weighed.count
         every = -(-count // RECORDED)
-        poses, values, best = self._rows(weighed.places, weighed.weights, weighed.standing, count, every)
-        moments, standing = self._fetched(self._moments), self._fetched(weighed.standing)
+        sent = self._rows(weighed.places, weighed.weights, weighed.standing, count, every)
+        on_the_way = self._send(sent | {"moments": self._moments, "standing": weighed.standing})
         rows = np.arange(0, count, every) if every > 1 else np.zeros(0, dtype=np.int64)
-        return [
-            LayerRecord(
-                layer=layer,
-                variance_weighed=moments[WEIGHED + 1, run],
-                variance_resampled=moments[SURVIVING + 1, run],
-                variance_diffused=moments[(SURVIVING if is_last else DIFFUSED) + 1, run],
-                best=best[run],
-                best_log_weight=float(standing[run, MOST]),
-                mean=moments[WEIGHED, run],
-                poses=poses[run],
-                log_weights=values[weighed.row, run],
-                rows=rows,
-            )
-            for run in range(self.runs)
-        ]
+
+        def records() -> list[LayerRecord]:
+            arrived = on_the_way.arrive()
+            poses, values, moments = arrived["rows"], arrived["values"], arrived["moments"]
+            return [
+                LayerRecord(
+                    layer=layer,
+                    variance_weighed=moments[WEIGHED + 1, run],
+                    variance_resampled=moments[SURVIVING + 1, run],
+                    variance_diffused=moments[(SURVIVING if is_last else DIFFUSED) + 1, run],
+                    best=poses[run, -1],
+                    best_log_weight=float(arrived["standing"][run, MOST]),
+                    mean=moments[WEIGHED, run],
+                    poses=poses[run, :-1],
+                    log_weights=values[weighed.row, run, :-1],
+                    rows=rows,
+                )
+                for run in range(self.runs)
+            ]
+
+        return records
+
+    def kept(self, given: DeviceSwarmSet) -> DeviceSwarmSet:
+        """A set with copies of the bests and leaders, which the next weighing changes."""
+        return self._with_copies(given, "kept ")
+
+    def put_back(self, kept: DeviceSwarmSet) -> DeviceSwarmSet:
+        """The set of which `kept` was made, as it was."""
+        return self._with_copies(kept, "")
+
+    def _with_copies(self, given: DeviceSwarmSet, where: str) -> DeviceSwarmSet:
+        copies = dict[str, Any]()
+        for name in ("bests", "reached", "leaders", "starts", "standing"):
+            there = getattr(given, name)
+            copies[name] = self._memory(where + name, there.shape, there.dtype.type)
+            copies[name].copy_to_device(there, stream=self._stream)
+        return dataclasses.replace(given, **copies)
 
     def give(self, there: DeviceSwarmSet, freedom: Array) -> list[ParticleSet]:
         """All runs' swarms on the host, with their values where they have been weighed. freedom : (D,) of the stage."""
@@ -270,19 +307,19 @@ class DeviceSwarm(DeviceRuns):
             row[SHRINK] = constriction(one.pull)
         return self._copied("keys", keys), self._copied("dials", rows)
 
-    def _next(self, count: int) -> DeviceSwarmSet:
-        """Where the next set goes: its places and velocities never where the last one has them."""
+    def _following(self, count: int, turn: int) -> DeviceSwarmSet:
+        """Where a set goes: its places and velocities never where that one has them from which it is made."""
         size, whole = len(self.space.names), self.runs * count
-        places = self._next_poses(count)
         return DeviceSwarmSet(
             count,
-            places,
-            self._memory(f"velocities {self._turn}", (size, whole), np.float32),
+            self._poses(count, turn),
+            self._memory(f"velocities {turn}", (size, whole), np.float32),
             self._memory("bests", (size, whole), np.float32),
             self._memory("reached", (2, whole), np.float64),
             self._memory("leaders", (size, self.runs), np.float32),
             self._memory("starts", (size, self.runs), np.float32),
             self._memory("standing", (self.runs, STANDING), np.float64),
+            turn=turn,
         )
 
     def _narrowed(self, poses: Array) -> NDArray[np.float32]:
@@ -291,10 +328,16 @@ class DeviceSwarm(DeviceRuns):
         return np.where(kept, np.clip(poses, *self._inner), poses).astype(np.float32)
 
 
-class DeviceSearch:
-    """Searches of one frame on a device, an iteration at a time, for `frame_loop`. evaluated : poses of each that the
-    last one weighed.
-    """
+@dataclass(frozen=True, slots=True, eq=False)
+class _Staged:
+    """A swarm, and the freedom (D,) of the stage that it is in."""
+
+    swarm: DeviceSwarmSet
+    freedom: Array
+
+
+class DeviceSearch(LayersAhead[_Staged]):
+    """Searches of one frame by a swarm on a device, for `frame_loop`: a layer is an iteration."""
 
     def __init__(
         self,
@@ -303,64 +346,65 @@ class DeviceSearch:
         spaces: Sequence[SearchSpace],
         settings: SwarmSettings,
     ) -> None:
-        """spaces : of the runs, which differ in σ0 alone."""
-        self.evaluated = 0
-        self._spaces, self._problem = spaces, problem
+        super().__init__(tracker, spaces)
+        self._problem = problem
         self._swarm = DeviceSwarm(problem.device, spaces[0], len(spaces))
-        self._set: DeviceSwarmSet | None = None
-        self._freedom = np.ones(len(spaces[0].names))
 
     def begin(
         self, previous: Sequence[FilterState], numbers: Sequence[RandomNumbers], settings: SwarmSettings
     ) -> None:
         """Sample the first stage's swarms about x̂."""
         first = stages_of(self._spaces[0].hierarchy, settings)[0]
-        self._freedom = first.freedom
         starts = np.array([predict_pose(one, settings) for one in previous])
         moments = [Moment(*one.key) for one in numbers]
-        samples = self._sampling(settings)
-        self._set = self._swarm.sample(starts, moments, first.particles, samples, settings.constraints)
+        samples = self._sampling(settings, first.freedom)
+        sampled = self._swarm.sample(starts, moments, first.particles, samples, settings.constraints)
+        self._set = _Staged(sampled, first.freedom)
 
     def take(self, sets: Sequence[ParticleSet]) -> None:
         """Go on from swarms of the host."""
-        self._set, self._freedom = self._swarm.take(sets), sets[0].extra[FREEDOM]
+        self._set = _Staged(self._swarm.take(sets), sets[0].extra[FREEDOM])
 
-    def step(
-        self, layer: int, numbers: Sequence[RandomNumbers], settings: SwarmSettings
-    ) -> list[LayerRecord]:
-        """Do an iteration and return its records."""
+    def particles(self) -> list[ParticleSet]:
+        """The swarms that the next iteration weighs, or the last one's with their values, on the host."""
         assert self._set is not None
+        return self._swarm.give(self._set.swarm, self._set.freedom)
+
+    def _launch(
+        self, given: _Staged, layer: int, moments: Sequence[Moment], settings: SwarmSettings
+    ) -> Launched[_Staged]:
         stages = stages_of(self._spaces[0].hierarchy, settings)
         now = moment_of(stages, layer)
         stage = stages[now.number]
-        trunk_first = seen_in(stage, self._freedom) == TRUNK_FIRST
-        steps, sampled = None, 0
+        trunk_first = seen_in(stage, given.freedom) == TRUNK_FIRST
+        steps, sampled, freedom = None, 0, given.freedom
         if now.iteration < stage.iterations:
             c = acceleration(now.iteration + 1, stage.iterations, settings.c_first, settings.c_last)
-            steps = [SwarmStep(one.sigma, c) for one in self._sampling(settings)]
+            steps = [SwarmStep(one.sigma, c) for one in self._sampling(settings, freedom)]
         elif now.number + 1 < len(stages):
             following = stages[now.number + 1]
-            self._freedom, sampled = following.freedom, following.particles
-            steps = self._sampling(settings)
-        weighed, self._set = self._swarm.step(
-            self._set,
+            freedom, sampled = following.freedom, following.particles
+            steps = self._sampling(settings, freedom)
+        weighed, moved = self._swarm.step(
+            given.swarm,
             self._problem,
-            [Moment(*one.key) for one in numbers],
+            moments,
             steps,
             constraints=settings.constraints,
             trunk_first=trunk_first,
             sampled=sampled,
         )
-        self.evaluated = weighed.count
-        return self._swarm.records(weighed, layer, is_last=steps is None)
+        sent = self._swarm.send(weighed, layer, is_last=steps is None)
+        return Launched(_Staged(moved, freedom), weighed.count, sent)
 
-    def particles(self) -> list[ParticleSet]:
-        """The swarms that the next iteration weighs, or the last one's with their values, on the host."""
-        assert self._set is not None
-        return self._swarm.give(self._set, self._freedom)
+    def _kept(self, given: _Staged) -> _Staged:
+        return dataclasses.replace(given, swarm=self._swarm.kept(given.swarm))
 
-    def _sampling(self, settings: SwarmSettings) -> list[SwarmStep]:
-        """The samples of swarms with this stage's freedom."""
+    def _put_back(self, kept: _Staged) -> _Staged:
+        return dataclasses.replace(kept, swarm=self._swarm.put_back(kept.swarm))
+
+    def _sampling(self, settings: SwarmSettings, freedom: Array) -> list[SwarmStep]:
+        """The samples of swarms with a stage's freedom."""
         moving = settings.start_velocity == "uniform"
-        factor = settings.diffusion_scale * self._freedom
+        factor = settings.diffusion_scale * freedom
         return [SwarmStep(space.sigma * factor, moving=moving) for space in self._spaces]

@@ -61,6 +61,7 @@ from studio.search.trackers.resampling import draw
 from studio.search.trackers.settings import SAMPLED, TemperedSettings
 from studio.search.trackers.tracker import (
     NO_PARENT,
+    Arrays,
     FilterState,
     FrameLikelihood,
     LayerRecord,
@@ -115,6 +116,7 @@ class TemperedFilter(ParticleFilter[TemperedSettings]):
     settings_type = TemperedSettings
     size_knobs = (("layers", "particles"),)
     presets = SAMPLED
+    device_module = "studio.search.trackers.device_tempered"
 
     def layer_count(self, settings: TemperedSettings) -> int:
         return settings.layers
@@ -127,6 +129,11 @@ class TemperedFilter(ParticleFilter[TemperedSettings]):
     def least_evaluations(self, layers: int) -> int:
         """Two particles in two layers."""
         return 4
+
+    def fits_device(self, layer: int, space: SearchSpace, settings: TemperedSettings, extra: Arrays) -> bool:
+        """Whether joint limits alone say which poses the body can take, and did where the set's moves lead from."""
+        held = extra.get(BEFORE_ELIGIBLE, np.zeros(0))
+        return not settings.limbs_apart and bool(np.isfinite(held).all())
 
     def begin_frame(
         self, numbers: RandomNumbers, previous: FilterState, space: SearchSpace, settings: TemperedSettings
