@@ -19,7 +19,8 @@ class ViewEvidence:
     background : the camera's empty view where the hull is to be carved from pixels; None: from the mask. A view with a
         background may have a mask of zeros, where none is needed.
     hidden : (H, W) uint8, above 0 where the mask says nothing of the body, since another subject is in front of it;
-        None: nowhere.
+        None: nowhere. Distances of silhouettes (`distance_maps`) leave it out; likelihoods weigh its pixels like any
+        other, the processor and a card alike.
     """
 
     camera: str

@@ -23,9 +23,10 @@ from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilt
 from studio.search.trackers.device_search import DeviceFilter, Moment
 from studio.search.trackers.frame_loop import FrameSearch, search_frame, search_together
 from studio.search.trackers.particle_swarm import ParticleSwarm
-from studio.search.trackers.settings import AnnealedSettings
+from studio.search.trackers.settings import AnnealedSettings, TemperedSettings
 from studio.search.trackers.swarm_settings import SwarmSettings
-from studio.search.trackers.tracker import FilterState, FrameResult, ParticleSet, SearchSpace
+from studio.search.trackers.tempered import TemperedFilter
+from studio.search.trackers.tracker import AnyTracker, FilterState, FrameResult, ParticleSet, SearchSpace
 
 LAYERS, SMALL, LAUNCHES = 10, 100, 10
 LOADS, WORDS, ROUNDS = 64, 1 << 20, 256
@@ -206,8 +207,31 @@ def swarm_time(
     settings: SwarmSettings,
     repeats: int,
 ) -> dict[str, float | int]:
-    """Milliseconds of a frame of a swarm whose particles stay on the card, records read. evaluations : of the frame."""
-    tracker, start = ParticleSwarm(), FilterState(ParticleSet(pose[None], np.zeros(1)))
+    """As `resident_frame`, of a swarm."""
+    return resident_frame(ParticleSwarm(), problem, space, pose, settings, repeats)
+
+
+def tempered_time(
+    problem: EdgeRegionSilhouetteFrameLikelihood,
+    space: SearchSpace,
+    pose: Array,
+    settings: TemperedSettings,
+    repeats: int,
+) -> dict[str, float | int]:
+    """As `resident_frame`, of tempered sequential Monte Carlo."""
+    return resident_frame(TemperedFilter(), problem, space, pose, settings, repeats)
+
+
+def resident_frame(
+    tracker: AnyTracker,
+    problem: EdgeRegionSilhouetteFrameLikelihood,
+    space: SearchSpace,
+    pose: Array,
+    settings: object,
+    repeats: int,
+) -> dict[str, float | int]:
+    """Milliseconds of a frame whose particles stay on the card, records read. evaluations : of the frame."""
+    start = FilterState(ParticleSet(pose[None], np.zeros(1)))
     last = search_frame(
         tracker, problem, start, space, seed=0, frame=0, settings_source=lambda: (0, settings)
     ).carried
@@ -224,6 +248,11 @@ def swarm_of(evaluations: int) -> SwarmSettings:
     """A swarm that a card does, of about so many evaluations a frame."""
     sizes = ParticleSwarm().evaluation_knobs(evaluations, 0)
     return dataclasses.replace(SwarmSettings(limbs_apart=False), **sizes)
+
+
+def tempered_of(evaluations: int) -> TemperedSettings:
+    """Tempered sequential Monte Carlo of about so many evaluations a frame."""
+    return dataclasses.replace(TemperedSettings(), **TemperedFilter().evaluation_knobs(evaluations, 0))
 
 
 def copy_times(likelihood: EdgeRegionSilhouetteLikelihood, evidence: Any, repeats: int) -> dict[str, float]:  # noqa: ANN401

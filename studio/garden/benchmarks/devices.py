@@ -21,7 +21,7 @@ from studio.search.likelihood.edge_region_silhouette import (
 from studio.search.trackers.settings import AnnealedSettings
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
-PARTICLES, RUNS, SWARM = (1_000, 10_000, 100_000), 64, 10_000
+PARTICLES, RUNS, SWARM, TEMPERED = (1_000, 10_000, 100_000), 64, 10_000, 10_000
 COMPARED = 2_000
 FRAMES_PER_SECOND = 60.0
 MEASURES = "studio.garden.benchmarks.card_measures"
@@ -34,8 +34,8 @@ def run_device_benchmark(
     repeats: int = 5,
     progress: Progress | None = None,
 ) -> dict[str, object]:
-    """Evaluations a second of each number of poses, milliseconds a frame of each number of particles and of a swarm,
-    and how much more many runs do at once; "none": why there is no card.
+    """Evaluations a second of each number of poses, milliseconds a frame of each number of particles, of a swarm
+    and of tempered SMC, and how much more many runs do at once; "none": why there is no card.
     """
     body = load_body("human31")
     cameras = ring_of_cameras(body)
@@ -70,6 +70,9 @@ def run_device_benchmark(
         ),
         "swarm_ms": lambda: measures.swarm_time(
             problem, space, body.neutral, measures.swarm_of(SWARM), repeats
+        ),
+        "tempered_ms": lambda: measures.tempered_time(
+            problem, space, body.neutral, measures.tempered_of(TEMPERED), repeats
         ),
         "copies_ms": lambda: measures.copy_times(there, evidence, repeats),
     }

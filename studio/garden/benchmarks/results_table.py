@@ -91,6 +91,7 @@ MEASURES = (
     _on_card("64 runs of 10 × 100, times one", ("many_runs", "times_one"), "×", 20.0),
     _on_card("64 seeds with records, times one", ("seeds_together", "times_one"), "×", 10.0),
     _on_card("swarm of 10 000 evaluations, a frame", ("swarm_ms", "frame"), "ms", 40.0, LESS),
+    _on_card("tempered of 10 000 evaluations, a frame", ("tempered_ms", "frame"), "ms", 40.0, LESS),
     _on_card("largest difference of a log-weight", ("agreement", "largest"), "", 1e-3, LESS),
     Measure("a whole frame, default tracker", ("frames", "default", "ms"), "ms", 25.0, LESS),
     Measure("of it refinement, one thread", ("frames", "default", "refinement_ms"), "ms", 5.0, LESS),

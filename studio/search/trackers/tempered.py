@@ -24,6 +24,8 @@ ladder of exponents 0 = t_0 < t_1 < … ≤ T leads there (Neal 2001; Del Moral,
 4. Layers that are left at the end of the ladder move the set only. A last layer that has not reached the end takes the
    rest of the way as weights.
 
+On a card all of this stays there (`device_tempered`), with limbs kept apart alone left to the processor.
+
 A record's `beta` is δ, so that weights, effective particles and survivors read as those of an annealed layer; its
 `temper` is t, its `log_evidence` that of t + δ, its `acceptance` the share of proposals taken into its set.
 

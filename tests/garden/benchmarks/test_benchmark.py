@@ -25,6 +25,7 @@ from studio.garden.benchmarks.results_table import in_lines, rows_of
 from studio.search.likelihood.edge_region import DEVICE_MODULE, EdgeRegionLikelihood, EdgeRegionSettings
 from studio.search.likelihood.silhouette_areas import FULL, silhouettes_of
 from studio.search.trackers.particle_swarm import ParticleSwarm
+from studio.search.trackers.tempered import TemperedFilter
 
 
 @pytest.fixture(scope="module")
@@ -131,15 +132,17 @@ def test_without_a_card_the_bench_says_so(monkeypatch):
 
 @pytest.mark.slow
 def test_frames_of_a_simulated_card_are_measured(tmp_path):
-    """A swarm's, and those of seeds side by side, which are the ones alone."""
+    """A swarm's and a tempered filter's, and those of seeds side by side, which are the ones alone."""
     script = Path(__file__).parents[2] / "search" / "trackers" / "simulated_frames.py"
     found = json.loads(run_simulated(script, tmp_path / "found.json").read_text())
     assert found["swarm"]["evaluations"] == 12
     assert found["seeds"]["same_as_alone"]
-    assert min(found["swarm"]["frame"], found["seeds"]["times_one"]) > 0.0
+    assert found["tempered"]["evaluations"] == 4
+    assert min(found["swarm"]["frame"], found["tempered"]["frame"], found["seeds"]["times_one"]) > 0.0
     measures = importlib.import_module("studio.garden.benchmarks.card_measures")
     whole = measures.swarm_of(10_000)
     assert ParticleSwarm().evaluations(whole) == 10_000
+    assert abs(TemperedFilter().evaluations(measures.tempered_of(10_000)) - 10_000) < 100
     assert ParticleSwarm().fits_device(0, SimpleNamespace(behaviour=None), whole, {})
 
 
@@ -148,7 +151,7 @@ def test_a_cards_figures_are_rows_beside_their_limits(monkeypatch):
     measures = importlib.import_module("studio.garden.benchmarks.card_measures")
     limits = {"loads_allow_M_per_s": 60.0, "launches_take_ms": 2.0}
     alone = {"card_limits": limits, "resident_rates": {"three_M_per_s": 41.0}, "frame_time": {"frame": 70.0}}
-    alone["swarm_time"] = {"frame": 30.0}
+    alone |= {"swarm_time": {"frame": 30.0}, "tempered_time": {"frame": 80.0}}
     absent = (
         "card_limits",
         "resident_rates",
@@ -156,6 +159,7 @@ def test_a_cards_figures_are_rows_beside_their_limits(monkeypatch):
         "many_runs",
         "seeds_together",
         "swarm_time",
+        "tempered_time",
         "copy_times",
     )
     for name in absent:
@@ -169,5 +173,6 @@ def test_a_cards_figures_are_rows_beside_their_limits(monkeypatch):
     assert (three["value"], three["limit"], three["reached"]) == (41.0, 60.0, 1.0)
     assert rows["card: annealed 10 × 10 000, a frame"]["reached"] == pytest.approx(15.0 / 70.0, abs=1e-3)
     assert rows["card: swarm of 10 000 evaluations, a frame"]["value"] == 30.0
+    assert rows["card: tempered of 10 000 evaluations, a frame"]["reached"] == 0.5
     assert rows["card: largest difference of a log-weight"]["reached"] == 1.0
     assert rows["card: three terms, 100 000 poses here"]["value"] > 0.0

@@ -9,8 +9,15 @@ from simulated_search import problem_of
 from simulated_weighing import wait_politely
 
 from studio.garden.benchmarks import card_measures
-from studio.search.trackers import device_search, device_search_kernels, device_swarm, device_swarm_kernels
-from studio.search.trackers.settings import AnnealedSettings
+from studio.search.trackers import (
+    device_search,
+    device_search_kernels,
+    device_swarm,
+    device_swarm_kernels,
+    device_tempered,
+    device_tempered_kernels,
+)
+from studio.search.trackers.settings import AnnealedSettings, TemperedSettings
 from studio.search.trackers.swarm_settings import SwarmSettings
 
 SMALL = SwarmSettings(
@@ -21,10 +28,15 @@ if __name__ == "__main__":
     wait_politely()
     for module in (device_search_kernels, device_search, device_swarm_kernels, device_swarm):
         module.SUMMING = 2
+    for module in (device_tempered_kernels, device_tempered):
+        module.SUMMING = module.MIXING = 2
     problem, space, poses = problem_of("gpu")
     filter_of_four = AnnealedSettings(layers=2, particles=4)
     found = {
         "swarm": card_measures.swarm_time(problem, space, poses[0], SMALL, 1),
+        "tempered": card_measures.tempered_time(
+            problem, space, poses[0], TemperedSettings(layers=2, particles=2), 1
+        ),
         "seeds": card_measures.seeds_together(problem, space, poses[0], filter_of_four, 3, 1),
     }
     Path(sys.argv[1]).write_text(json.dumps(found))
