@@ -209,6 +209,74 @@ def test_sound_limbs_are_not_drawn_and_the_last_pose_is_tried_first(
     assert len(frame.asked) == 2
 
 
+@pytest.fixture(scope="module")
+def tailed() -> Refiner:
+    """Of a mouse whose roll has limits, so that its tail of eight angles is drawn joint by joint."""
+    mouse = load_body("mouse")
+    at = next(int(at) for at in root_parameters(mouse) if mouse.angles[at])
+    entries = list(mouse.parameters)
+    entries[at] = dataclasses.replace(entries[at], lower=-1.0, upper=1.0)
+    return Refiner(dataclasses.replace(mouse, parameters=tuple(entries)), CAMERAS, RefinementSettings())
+
+
+def test_a_chain_is_drawn_joint_by_joint_from_a_straight_one(tailed: Refiner) -> None:
+    """One pose and 160 draws of it for the first joint; of six that are kept 160 each for every other."""
+    own, asked = frames.bent_by(tailed, "tail"), []
+    pose = tailed.neutral + 0.05
+    joints = frames._joints_of(tailed.body, own)
+    frame = Told(tailed.body, tailed)
+
+    def places(poses: Array, silhouettes: object) -> Array:
+        asked.append(poses)
+        # The last ones are best.
+        return -np.arange(len(poses), dtype=float)
+
+    frame.agreement = SimpleNamespace(of_places=places)
+    kept, weighed = frames.drawn_along(np.random.default_rng(0), frame, pose, own)
+    assert [len(poses) for poses in asked] == [161] + [6 + 6 * 160] * (len(joints) - 1)
+    assert weighed == sum(len(poses) for poses in asked)
+    assert kept.shape == (6, len(pose))
+    for number, poses in enumerate(asked):
+        beyond = [at for later in joints[number + 1 :] for at in later]
+        np.testing.assert_array_equal(poses[:, beyond], np.tile(tailed.neutral[beyond], (len(poses), 1)))
+        others = np.setdiff1d(np.arange(len(pose)), own)
+        np.testing.assert_array_equal(poses[:, others], np.tile(pose[others], (len(poses), 1)))
+        if number:
+            # What was kept is among the draws: the best that differ, of which the very last is the first.
+            np.testing.assert_array_equal(poses[0], asked[number - 1][-1])
+
+
+@pytest.mark.parametrize(("loss", "turned"), [(9.49, True), (9.5, False)])
+def test_a_body_is_turned_round_where_its_loss_is_clearly_lower(
+    tailed: Refiner, loss: float, turned: bool
+) -> None:
+    own = frames.bent_by(tailed, "tail")
+    found, other = (with_pose(hypothesis(value, tail=0.5), tailed.neutral) for value in (10.0, loss))
+    frame = Told(tailed.body, tailed, {"tail": other})
+    frame.hypothesis = lambda pose: with_pose(found, pose)
+    frame.refiner = SimpleNamespace(
+        refine=lambda pose, views: SimpleNamespace(pose=pose), body=tailed.body, neutral=tailed.neutral,
+        lower=tailed.lower, upper=tailed.upper, bounded=tailed.bounded,
+    )  # fmt: skip
+    one, weighed = frames._turned_round(np.random.default_rng(0), found, frame, own)
+    assert one is (other if turned else found)
+    assert weighed > 1000
+    # What is drawn of the tail is taken wherever it is better at all.
+    assert [asked for asked in frame.asked if asked[0] == "best of"] == [("best of", ("tail",), 6, 1.0)]
+
+
+def test_a_lost_tail_is_drawn_along_and_then_with_the_body_turned_round(
+    tailed: Refiner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(frames, "_turned_round", lambda rng, found, frame, own: (found, 7))
+    monkeypatch.setattr(frames, "drawn_along", lambda rng, frame, pose, own: (pose[None], 100))
+    for share, weighed in ((0.061, 107), (0.06, 100)):
+        lost = with_pose(hypothesis(9.0, tail=share, trunk=0.0), tailed.neutral)
+        frame = Told(tailed.body, tailed)
+        assert frames.redrawn(np.random.default_rng(0), lost, frame) == (lost, weighed)
+        assert frame.asked == [("best of", ("tail",), 1, 0.97)]
+
+
 def test_another_pose_is_taken_below_its_share_of_the_loss() -> None:
     losses = {1.0: 8.49, 2.0: 8.5, 3.0: 9.69, 4.0: 9.7}
     seen = SeenFrame(

@@ -1,5 +1,6 @@
 """The search for a start step by step: which lines are kept, which limbs are drawn and how, where candidates stand."""
 
+import dataclasses
 import threading
 from types import SimpleNamespace
 
@@ -336,6 +337,16 @@ def test_attitudes_are_drawn_about_rest_narrowly_and_widely_within_limits() -> N
     assert 150 < which.any(axis=1).sum() < 250
     assert (which.sum(axis=0) > 30).all()
     np.testing.assert_array_equal(mixed[~which.any(axis=1)], found[~which.any(axis=1)])
+
+
+def test_a_joint_with_one_limit_stays_at_rest() -> None:
+    at, entries = len(BODY.parameters) - 1, list(BODY.parameters)
+    for limits in ({"upper": np.inf}, {"lower": -np.inf}):
+        entries[at] = dataclasses.replace(BODY.parameters[at], **limits)
+        body = dataclasses.replace(BODY, parameters=tuple(entries))
+        found = candidates._attitudes(np.random.default_rng(0), body, 20, None)
+        assert (found[:, at] == BODY.neutral[at]).all()
+        assert np.ptp(found[:, at - 1]) > 0.0
 
 
 def test_places_are_in_the_middle_half_of_the_box_with_the_feet_on_the_floor() -> None:
