@@ -36,7 +36,7 @@ _VERBS = {
         "open_session",
         "workflow",
     ),
-    "studio.operations.filmed_bodies": ("body_from_film",),
+    "studio.operations.filmed_bodies": ("body_from_film", "carry_clicks"),
     "studio.operations.own_bodies": ("edit_body",),
     "studio.operations.person": ("fit_subject", "initialise", "landmarks", "subject"),
     "studio.operations.remote": ("batch", "download", "upload"),

@@ -15,6 +15,7 @@ from studio.operations.comparing import compare as compare
 from studio.operations.comparing import sweep as sweep
 from studio.operations.course import course as course
 from studio.operations.filmed_bodies import body_from_film as body_from_film
+from studio.operations.filmed_bodies import carry_clicks as carry_clicks
 from studio.operations.footage import add_footage as add_footage
 from studio.operations.footage import import_footage as import_footage
 from studio.operations.footage import new_session as new_session

@@ -259,13 +259,18 @@ def fit_poses(
     frames: Sequence[FrameClicks],
     body: BodyModel,
     near: Sequence[Array],
+    *,
+    held: bool = False,
 ) -> FilmFit:
-    """The poses of a body of known sizes in frames. near : poses (D,) to begin with, besides the rest pose."""
+    """The poses of a body of known sizes in frames. near : poses (D,) to begin with, besides the rest pose. held :
+    whether its root is in the same place in all of them.
+    """
     fixed = FilmedTree(body, tree.names)
-    problem = _Problem(fixed, cameras, frames, 1.0, held=False, sigma=USUAL_NOISE, sized=False)
+    problem = _Problem(fixed, cameras, frames, 1.0, held=held, sigma=USUAL_NOISE, sized=False)
     none = np.ones(0)
     poses = problem.solved(none, first_poses(fixed, fixed.body, frames))[1]
-    return problem.fit(none, problem.retried(none, poses, near))
+    poses = problem.retried(none, poses, near)
+    return problem.fit(none, problem.solved(none, poses)[1] if held else poses)
 
 
 def first_poses(tree: FilmedTree, body: BodyModel, frames: Sequence[FrameClicks]) -> Array:

@@ -69,6 +69,7 @@ COMMANDS = {
     "bodies": ("session_commands", "operations.opening.bodies"),
     "edit-body": ("session_commands", "operations.own_bodies.edit_body"),
     "body-from-film": ("session_commands", "operations.filmed_bodies.body_from_film"),
+    "carry-clicks": ("session_commands", "operations.filmed_bodies.carry_clicks"),
     "runs": ("session_commands", "cli.session_commands.runs_command"),
     "upload": ("remote_commands", "operations.remote.upload"),
     "download": ("remote_commands", "operations.remote.download"),

@@ -1,5 +1,5 @@
 """What there is and how it stands: `gallery`, `inspect`, `runs`, `workflow`; bodies: `bodies`, `edit-body`,
-`body-from-film`.
+`body-from-film`, `carry-clicks`.
 """
 
 from collections.abc import Sequence
@@ -10,12 +10,13 @@ import click
 from studio.cli.deriving import Call, command_of
 from studio.cli.output import EXIT_CODE, FOUND_FAULTS, command
 from studio.foundations.words import counted
-from studio.operations.filmed_bodies import body_from_film
+from studio.operations.filmed_bodies import body_from_film, carry_clicks
 from studio.operations.foreign import inspect
 from studio.operations.gallery import Gallery, gallery
 from studio.operations.opening import bodies, workflow
 from studio.operations.own_bodies import EditedBody, edit_body
 from studio.operations.remote import runs_there
+from studio.runs.carried_clicks import CarriedClicks
 from studio.runs.setup.body_from_film import FilmedBody
 from studio.runs.setup.workflow import Workflow
 from studio.sessions.foreign_sessions import Inspection
@@ -149,6 +150,22 @@ def body_from_film_command(call: Call) -> dict[str, object]:
         "notes": list(made.notes),
         "text": "\n".join(lines),
         **entries,
+    }
+
+
+@command_of(carry_clicks)
+def carry_clicks_command(call: Call) -> dict[str, object]:
+    made: CarriedClicks = call()
+    return {
+        "session": call.given["session"].name,
+        "run": made.run.name,
+        "frames": made.frames,
+        "clicked": list(made.clicked),
+        "off": made.off,
+        "unclicked": list(made.unclicked),
+        "notes": list(made.notes),
+        "text": f"Run '{made.run.name}': {counted(made.frames, 'frame')}. Where they were clicked, landmarks lie"
+        f" {made.off:.1f} pixels off (median).",
     }
 
 

@@ -1,4 +1,4 @@
-"""A body from its film: landmarks clicked in a few frames, and the body that is made of them."""
+"""A body from its film: landmarks clicked in a few frames, the body that is made of them, and the run."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,6 +16,7 @@ from studio.foundations.errors import BodyError
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.own_bodies import save_body
 from studio.operations.progress import Reporting, reporting, say
+from studio.runs.carried_clicks import CarriedClicks, CarryRequest, run_of_clicks
 from studio.runs.setup.body_from_film import FilmedBody, FilmRequest, body_of_film
 from studio.sessions.landmark_clicks import LandmarkClick, clicks_of_file, keep_clicks, stored_clicks
 from studio.sessions.session import BODIES_NAME, Session
@@ -30,18 +31,21 @@ class ClickedLandmarks:
     clicks: tuple[LandmarkClick, ...]
 
 
+ClicksFile = Annotated[
+    str | Path,
+    Field(
+        description="CSV of clicks: frame,camera,landmark,x,y in pixels; default: those clicked in the browser."
+    ),
+    Terminal(option="--landmarks", metavar="FILE", kind=Path),
+]
+
+
 @operation
 @taking(FilmRequest)
 @keeping_in_place
 def body_from_film(
     session: SessionName,
-    landmarks: Annotated[
-        str | Path,
-        Field(
-            description="CSV of clicks: frame,camera,landmark,x,y in pixels; default: those clicked in the browser."
-        ),
-        Terminal(option="--landmarks", metavar="FILE", kind=Path),
-    ] = "",
+    landmarks: ClicksFile = "",
     *,
     like: Annotated[
         str,
@@ -71,12 +75,7 @@ def body_from_film(
     Raises BodyError for landmarks that the body has not, and where the clicks say too little.
     """
     opened = open_session(session)
-    clicks = clicks_of_file(opened, Path(landmarks)) if landmarks else stored_clicks(opened)
-    if not clicks:
-        raise BodyError(
-            f"No landmarks were clicked in session '{opened.name}'.",
-            "Click them in step Subject of the guided set-up, or give a CSV file of them.",
-        )
+    clicks = _clicks(opened, landmarks)
     template = load_body(like or opened.manifest.body, opened.body_folders)
     with reporting(progress, f"{opened.name}: body from film") as report:
         made = body_of_film(opened, template, clicks, FilmRequest(**request), report)
@@ -85,6 +84,43 @@ def body_from_film(
         return made
     file = save_body(made.text, save_as, opened.path.parent / BODIES_NAME, replace=replace)
     return dataclasses.replace(made, body=parse_body(made.text, save_as, file.name), file=file, saved=save_as)
+
+
+@operation
+@taking(CarryRequest)
+@keeping_in_place
+def carry_clicks(
+    session: SessionName,
+    landmarks: ClicksFile = "",
+    *,
+    progress: Reporting = None,
+    **request: Any,  # noqa: ANN401 - of the types that are declared
+) -> CarriedClicks:
+    """Make a run of landmarks clicked in a few frames: their poses, carried to the others by how the limbs look.
+
+    For subjects that no mask shows, or whose limbs move in front of them. Needs no masks, and a body of the right sizes
+    (`body_from_film`). The more frames are clicked, the fewer legs go astray; clicks in the frames where they did, and
+    the run again, put it right.
+
+    Raises BodyError for landmarks that the body has not, and where the clicks say too little; RunError.
+    """
+    opened = open_session(session)
+    clicks = _clicks(opened, landmarks)
+    with reporting(progress, f"{opened.name}: carrying clicks") as report:
+        made = run_of_clicks(opened, clicks, CarryRequest(**request), report)
+    say(progress, made.notes)
+    return made
+
+
+def _clicks(session: Session, landmarks: str | Path) -> tuple[LandmarkClick, ...]:
+    """The clicks of a file, or those that the session keeps. Raises BodyError where there are none."""
+    clicks = clicks_of_file(session, Path(landmarks)) if landmarks else stored_clicks(session)
+    if not clicks:
+        raise BodyError(
+            f"No landmarks were clicked in session '{session.name}'.",
+            "Click them in step Subject of the guided set-up, or give a CSV file of them.",
+        )
+    return clicks
 
 
 def clicked_landmarks(session: Session, like: str = "") -> ClickedLandmarks:

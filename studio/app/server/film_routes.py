@@ -1,4 +1,4 @@
-"""A body from its film: landmarks clicked on the cameras' pictures, and the body that is made of them."""
+"""A body from its film: landmarks clicked on the cameras' pictures, the body that is made of them, and the run."""
 
 from typing import Annotated
 
@@ -15,6 +15,7 @@ from studio.foundations.declaring import LARGEST
 from studio.operations.filmed_bodies import (
     ClickedLandmarks,
     body_from_film,
+    carry_clicks,
     clicked_landmarks,
     keep_landmarks,
 )
@@ -38,6 +39,23 @@ FILM = JobKind(
     changes_session=True,
     at="/api/bodies-from-film/{identifier}",
     page="/bodies?session={session}",
+)
+
+
+class CarriedState(NumberedJob):
+    """How a run of clicks stands. run: its name, once it is done; notes: on it."""
+
+    run: str = ""
+    notes: tuple[str, ...] = ()
+
+
+CARRIED = JobKind(
+    "carry-clicks",
+    "run of clicked landmarks",
+    CarriedState,
+    changes_session=True,
+    at="/api/carried-clicks/{identifier}",
+    page="/?session={session}&run={run}",
 )
 
 
@@ -87,3 +105,21 @@ def begin_film(
 
 
 add_job_routes(router, "/bodies-from-film/{identifier}", FILM)
+
+
+@router.post("/sessions/{session}/carry-clicks", status_code=202)
+def begin_carrying(
+    session: OpenSession,
+    arguments: Annotated[Arguments, body_of(carry_clicks, "CarryClicksRequest")],
+    app: App,
+) -> CarriedState:
+    """Begin to make a run of the session's clicks. Ask for its state, or wait for `carry-clicks` events."""
+
+    def work(job: Job) -> dict[str, object]:
+        made = carry_clicks(session, **arguments, progress=job.report_or_stop)
+        return {"run": made.run.name, "notes": made.notes}
+
+    return app.jobs.begin(CARRIED, CarriedState(session=session.name), work)
+
+
+add_job_routes(router, "/carried-clicks/{identifier}", CARRIED)

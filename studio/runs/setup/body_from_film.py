@@ -179,7 +179,7 @@ def body_of_film(
             "Click other landmarks, or give the lengths in the body's file as named dimensions.",
         )
     progress("triangulating the landmarks", 0, 4)
-    seen = _Seen(tree.names, cameras, clicks, request.tolerance)
+    seen = SeenLandmarks(tree.names, cameras, clicks, request.tolerance)
     usable = seen.usable()
     for frame in request.frames:
         if frame not in usable:
@@ -238,7 +238,7 @@ def body_of_film(
     )
 
 
-class _Seen:
+class SeenLandmarks:
     """The landmarks in space, frame by frame."""
 
     def __init__(
