@@ -169,7 +169,8 @@ CARDS = (
     Card(
         "fly",
         "A tethered fly on a ball",
-        "Seven grey cameras, 15 frames, no empty picture: its body's lengths come from landmarks clicked in the film.",
+        "Seven grey cameras, 15 frames, no empty picture, no mask: landmarks clicked in a few frames give its lengths,"
+        " and its legs' look carries the poses to the other frames.",
         "elsewhere",
         data="github.com/NeLy-EPFL/DeepFly3D (LGPL-3), tests/data/reference: pictures, cameras, a network's points.",
         footage="fly",
@@ -179,6 +180,7 @@ CARDS = (
             "studio import fly --unit mm --fps 100 --into fly",
             "studio subject fly --body fly48",
             "studio body-from-film fly --like fly48 --as my-fly",
+            "studio carry-clicks fly --body my-fly --held --first 0 --last 15",
         ),
         guide="/guide/animal",
     ),

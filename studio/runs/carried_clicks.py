@@ -8,7 +8,7 @@ A limb counts in the views in which landmarks of its group were clicked: what no
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Annotated
@@ -16,12 +16,14 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from studio.body.film_fit import FilmedTree, fit_poses
+from studio.body.dragging import root_joint
+from studio.body.film_fit import FilmedTree, FrameClicks, fit_poses
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.model import BodyModel
 from studio.body.writing import body_text
+from studio.evidence.look_maps import look_maps
 from studio.footage.capture.footage import Footage
-from studio.foundations.arrays import Array, Indices
+from studio.foundations.arrays import Array, Floats, Indices
 from studio.foundations.declaring import Body, Seed
 from studio.foundations.errors import BodyError, RunError
 from studio.foundations.geometry.camera import Camera
@@ -31,7 +33,7 @@ from studio.foundations.words import counted
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.setup.body_from_film import SeenLandmarks
 from studio.runs.setup.session_settings import session_settings
-from studio.search.likelihood.limb_looks import Floats, LookMaps, kept_looks, look_maps, look_scores
+from studio.search.likelihood.limb_looks import kept_looks, look_scores
 from studio.search.likelihood.outlines import OutlineProjector
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, values
 from studio.search.trackers.tracker import Estimate, FilterState, FrameResult, ParticleSet
@@ -186,16 +188,13 @@ def limb_groups(body: BodyModel, tree: FilmedTree, clicked: Mapping[int, Sequenc
     return groups
 
 
-def _seen_in(frames: object, view: int) -> list[int]:
-    return sorted({int(one) for clicks in frames for one in clicks.landmark[clicks.camera == view]})  # type: ignore[attr-defined]
+def _seen_in(frames: Iterable[FrameClicks], view: int) -> list[int]:
+    return sorted({int(one) for clicks in frames for one in clicks.landmark[clicks.camera == view]})
 
 
 def _is_root(body: BodyModel, group: LimbGroup) -> bool:
-    return bool(np.isin(group.columns, body.joints[_root(body)].parameters).all())
-
-
-def _root(body: BodyModel) -> int:
-    return next(place for place, joint in enumerate(body.joints) if joint.parameters)
+    root = root_joint(body)
+    return root >= 0 and bool(np.isin(group.columns, body.joints[root].parameters).all())
 
 
 class _Carrying:
@@ -296,7 +295,7 @@ class _Carrying:
             (0.5 * (((drawn - other) / step) ** 2).sum(axis=1) for other in beside), np.zeros(len(drawn))
         )
 
-    def _scores(self, maps: Mapping[int, LookMaps], group: LimbGroup, pose: Array, drawn: Array) -> Array:
+    def _scores(self, maps: Mapping[int, Floats], group: LimbGroup, pose: Array, drawn: Array) -> Array:
         poses = np.repeat(pose[None], len(drawn), axis=0)
         poses[:, group.columns] = drawn
         total = np.zeros(len(drawn))
@@ -309,7 +308,7 @@ class _Carrying:
     def _corners(self, view: int, poses: Array) -> Array:
         return self._projectors[view].corners(poses)[0][:, 0]
 
-    def _maps(self, frame: int, views: Sequence[int]) -> dict[int, LookMaps]:
+    def _maps(self, frame: int, views: Sequence[int]) -> dict[int, Floats]:
         absent = self._footage.absent(frame)
         names = {view: self._cameras[view].name for view in views}
         missing = [name for name in names.values() if name in absent]

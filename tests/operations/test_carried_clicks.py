@@ -78,7 +78,7 @@ def test_poses_are_carried_to_the_frames_between(session: Session) -> None:
     assert made.off < 1.0
     track = studio.read_track(made.run)
     assert track.frames.tolist() == [0, 1, 2, 3, 4]
-    straight = np.linspace(movement()[0], movement()[4], FRAMES)
+    straight = np.repeat(movement()[:1], FRAMES, axis=0)  # the first pose and the last are the same
     assert off(straight)[2] > 100.0
     assert off(track.poses).max() < 15.0
 

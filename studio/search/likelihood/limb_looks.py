@@ -1,22 +1,17 @@
 """The look of limbs: evidence for those that no silhouette shows, such as a leg in front of its body.
 
-A limb's look is a strip of the picture along its outline, somewhat wider than it. Where a pose is known, its strips are kept;
-where none is, a strip scores the greatest of its correlations with the kept ones (from -1 to 1: brightness and contrast
-do not count), and how steeply the picture changes across its two sides, as a share of how much it changes near there.
+A limb's look is a strip of the picture along its outline, somewhat longer and wider than it. Where a pose is known, its
+strips are kept; where none is, a strip scores the greatest of its correlations with the kept ones (from -1 to 1:
+brightness and contrast do not count), and how steeply the picture changes across its two sides, as a share of how much
+it usually changes nearby. Maps are those of `evidence.look_maps`.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from studio.evidence.edges import grey
-from studio.foundations.arrays import Array, Bytes
+from studio.foundations.arrays import Array, Floats
 from studio.foundations.numba_in_threads import FAST, FAST_INLINED, njit
-
-Floats = NDArray[np.float32]
 
 ALONG, ACROSS = 14, 12
 """Places of a strip along and across its limb."""
@@ -24,10 +19,6 @@ BEYOND = 0.15
 """Share of the limb's length by which a strip begins before it and ends behind it, so that ends are told."""
 REACH, CORE = 2.2, 1.2
 """Half widths of the limb to which a strip reaches, and within which it mainly counts: a Gaussian's deviation."""
-SMOOTHING, NEARBY = 1.5, 12.0
-"""Pixels: Gaussians that smooth the picture, and by which the usual slope near a pixel is found."""
-FAINT = 1.0
-"""Grey levels per pixel: slopes below are noise."""
 FLAT = 2.0
 """Grey levels: contrast within a strip below which its correlation counts less."""
 SIDES, STEEPEST = 0.3, 1.5
@@ -36,34 +27,19 @@ UNSEEN = -1.0
 """Score of a limb behind the camera."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LookMaps:
-    """One picture, made ready. values : (3, H, W) smoothed grey levels, slopes in x and y as shares of the usual."""
-
-    values: Floats
-
-
-def look_maps(picture: Bytes) -> LookMaps:
-    """The maps of a picture (H, W, 3) BGR."""
-    smooth = cv2.GaussianBlur(np.asarray(grey(picture), np.float32), (0, 0), SMOOTHING)
-    x, y = (np.asarray(cv2.Sobel(smooth, cv2.CV_32F, *way, ksize=3)) / 8.0 for way in ((1, 0), (0, 1)))
-    usual = np.sqrt(cv2.GaussianBlur(x * x + y * y, (0, 0), NEARBY) + FAINT**2)
-    return LookMaps(np.ascontiguousarray(np.stack([smooth, x / usual, y / usual]), dtype=np.float32))
-
-
-def kept_looks(maps: LookMaps, corners: Array) -> Floats:
+def kept_looks(maps: Floats, corners: Array) -> Floats:
     """(L, ALONG, ACROSS) the strips of limbs that are known to lie at corners (L, 4, 2), ready to be compared: of no
     mean and of length 1, or less where there is little contrast. NaN corners give zeros.
     """
     looks = np.zeros((len(corners), ALONG, ACROSS), dtype=np.float32)
-    read_looks(maps.values, np.ascontiguousarray(corners), _weights(), looks)
+    read_looks(maps, np.ascontiguousarray(corners), _weights(), looks)
     return looks
 
 
-def look_scores(maps: LookMaps, corners: Array, looks: Sequence[Floats]) -> Array:
+def look_scores(maps: Floats, corners: Array, looks: Sequence[Floats]) -> Array:
     """(N, L) scores of limbs at corners (N, L, 4, 2), NaN where they are unseen. looks : at least one."""
     scores = np.empty(corners.shape[:2])
-    score_looks(maps.values, np.ascontiguousarray(corners), _weights(), np.stack(looks), scores)
+    score_looks(maps, np.ascontiguousarray(corners), _weights(), np.stack(looks), scores)
     return scores
 
 

@@ -43,6 +43,10 @@ def test_clicks_are_kept_and_a_body_is_made_of_them(studio: Studio) -> None:
     sizes = {one["name"]: one["after"] for one in done["made"]["sizes"]}
     assert abs(sizes["link_2_length"] - 400.0) < 8.0
     assert studio.get("/api/bodies/long-arm")["title"].endswith("sized by its film")
+    begun = studio.post("/api/sessions/arm/carry-clicks", {"name": "carried", "last": 2}, code=202)
+    until(lambda: studio.get(f"/api/carried-clicks/{begun['identifier']}")["state"] in ("done", "failed"))
+    assert studio.get(f"/api/carried-clicks/{begun['identifier']}")["run"] == "carried"
+    assert [one["name"] for one in studio.get("/api/sessions/arm/runs")["runs"]] == ["carried"]
     studio.put(PATH, {"clicks": []})
     assert studio.get(PATH)["clicks"] == []
     shutil.rmtree(folder)

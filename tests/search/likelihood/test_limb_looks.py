@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from studio.evidence.look_maps import SMOOTHING, look_maps
 from studio.foundations.arrays import Array, Bytes
-from studio.search.likelihood.limb_looks import FLAT, SMOOTHING, UNSEEN, kept_looks, look_maps, look_scores
+from studio.search.likelihood.limb_looks import FLAT, UNSEEN, kept_looks, look_scores
 
 HEIGHT, WIDTH = 120, 160
 
