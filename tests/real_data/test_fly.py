@@ -113,6 +113,7 @@ def test_points_that_disagree_are_named(made: FilmedBody) -> None:
     assert len(named) < 0.05 * len(list(itertools.product(range(15), landmarks_in_order())))
 
 
+@pytest.mark.timeout(1500)
 def test_legs_are_carried_to_frames_that_nobody_clicked(
     made: FilmedBody, session: Session, folder: Path, tmp_path: Path
 ) -> None:
