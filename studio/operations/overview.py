@@ -22,7 +22,7 @@ from studio.runs.sides import notes_of
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, SettingsHistory
 from studio.search.trackers.catalogue import size_in_words
 from studio.sessions.run_log import LogEntry, read_log
-from studio.sessions.run_record import RunRecord
+from studio.sessions.run_record import OF_CLICKS, RunRecord
 from studio.sessions.session import Session
 from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.workspace import SessionSummary, Workspace, next_step, unusable
@@ -280,6 +280,8 @@ def describe(record: RunRecord, history: SettingsHistory = NOTHING_CHANGED) -> s
     """A run in a few words: tracker, layers × particles (with the frame from which they changed), the likelihood if it
     is not the tracker's usual one.
     """
+    if record.start_source == OF_CLICKS:
+        return OF_CLICKS
     size = size_in_words(record.tracker, record.settings)
     now = size
     for entry in history.entries:

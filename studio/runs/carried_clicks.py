@@ -40,7 +40,7 @@ from studio.search.trackers.tracker import Estimate, FilterState, FrameResult, P
 from studio.sessions.landmark_clicks import LandmarkClick
 from studio.sessions.manifest import now
 from studio.sessions.results_store import ResultsWriter
-from studio.sessions.run_record import RunRecord
+from studio.sessions.run_record import OF_CLICKS, RunRecord
 from studio.sessions.session import Session, free_run_name, make_numbered_run
 from studio.sessions.stored_run import StoredRun
 
@@ -344,7 +344,7 @@ def _stored(
         settings=dict(values(settings)),
         sigma=tuple(session_sigma(session, body, session.manifest.fps).tolist()),
         start_pose=tuple(poses[0].tolist()),
-        start_source="clicked landmarks",
+        start_source=OF_CLICKS,
         software=software_version(),
         notes=tuple(notes),
     )

@@ -17,6 +17,8 @@ SCHEMA_VERSION = 2
 FILE_NAME = "run.json"
 CAMERAS_NAME = "cameras.toml"
 BEHAVIOUR_NAME = "behaviour.model"
+OF_CLICKS = "clicked landmarks, carried to the other frames"
+"""Start source of a run that no tracker searched."""
 
 
 class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""Landmarks are clicked in the guided set-up, kept as they are clicked, and a body is made of them."""
+"""Landmarks are clicked in the guided set-up, kept as they are clicked; a body is made of them, and a run."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -80,5 +80,12 @@ def test_a_body_is_made_of_clicks_that_a_reload_finds(
     assert float(row.locator("td").nth(2).inner_text()) == pytest.approx(380.0, rel=0.03)
     row.scroll_into_view_if_needed()
     window.shoot(artefacts / "body-from-film-dark.png")
+    page.get_by_role("button", name="Make a run of the clicks").click()
+    page.get_by_role("link", name="run-1").wait_for()
+    record = studio.get("/api/sessions/arm/runs/run-1")
+    assert (record["run"]["body"], record["run"]["done"]) == ("long-arm", 3)
+    window.shoot(artefacts / "run-of-clicks-dark.png")
+    page.reload()
+    page.get_by_role("link", name="run-1").wait_for()
     page.get_by_role("link", name="long-arm").click()
     page.get_by_role("heading", name="long-arm").wait_for()

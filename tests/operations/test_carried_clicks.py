@@ -15,6 +15,7 @@ from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
+from studio.operations.overview import describe
 from studio.runs import carried_clicks
 from studio.sessions.landmark_clicks import keep_clicks
 from studio.sessions.session import Session
@@ -87,11 +88,12 @@ def test_a_run_of_clicks_says_how_it_was_made_and_is_exported_as_any(
     session: Session, tmp_path: Path
 ) -> None:
     clicked_in((0, 2), session)
-    told = answer_of("carry-clicks arm --name carried")
-    assert (told["run"], told["frames"], told["clicked"]) == ("carried", 3, [0, 2])
+    answer = answer_of("carry-clicks arm --name carried")
+    assert (answer["run"], answer["frames"], answer["clicked"]) == ("carried", 3, [0, 2])
     run = studio.open_run("arm/carried")
     assert "no tracker searched them" in run.record.notes[0]
     assert run.summary().done == 3
+    assert describe(run.record) == run.record.start_source, "no tracker's name"
     studio.export_run(run, tmp_path / "poses.csv")
     assert len((tmp_path / "poses.csv").read_text().splitlines()) > FRAMES - 2
 

@@ -1,5 +1,5 @@
 // A body from its film: its landmarks clicked in several views of a few frames, kept with the
-// session as they are clicked, and the body that is made of them.
+// session as they are clicked, the body that is made of them, and a run.
 
 import { fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { ClickViews } from "./calibration_points.js";
@@ -11,9 +11,13 @@ import { NAME } from "./elements.js";
 /** @import { Schemas } from "./api_types" */
 /** @typedef {Schemas["ClickEntry"]} Click */
 /** @typedef {Schemas["FilmState"]} Film */
+/** @typedef {Schemas["CarriedState"]} Carried */
 
 const PICTURE_HEIGHT = 1080;
 const ALL = "";
+/** Where the jobs are. */
+const FILMS = "/api/bodies-from-film";
+const CARRYINGS = "/api/carried-clicks";
 
 /**
  * What is clicked, and what can be done.
@@ -33,6 +37,7 @@ export function landmarksOf(setup, bodies, first) {
   /** The one camera that is shown, "" for all. */
   const camera = signal(ALL);
   const film = signal(/** @type {Film | null} */ (null));
+  const carried = signal(/** @type {Carried | null} */ (null));
   const failed = signal(/** @type {any} */ (null));
   const attempt = attempting(failed);
   let saving = Promise.resolve();
@@ -58,25 +63,41 @@ export function landmarksOf(setup, bodies, first) {
   const isOf = (/** @type {Click} */ one, /** @type {string} */ landmark) =>
     one.frame === frame.value && one.landmark === landmark;
 
-  /** Follow a job to its end. @param {() => Promise<Film>} begin */
-  const follow = (begin) =>
+  /**
+   * Follow a job to its end.
+   * @param {{ value: any }} state
+   * @param {string} at its addresses begin so
+   * @param {() => Promise<any>} begin
+   */
+  const follow = (state, at, begin) =>
     attempt(async () => {
-      film.value = null;
+      state.value = null;
       const begun = await begin();
-      film.value = begun;
+      state.value = begun;
       try {
-        const path = `/api/bodies-from-film/${begun.identifier}`;
-        const ended = await followJob(path, into(film), () => isLeft);
-        if (ended) film.value = ended;
+        const path = `${at}/${begun.identifier}`;
+        const ended = await followJob(
+          path,
+          (job) => (state.value = job),
+          () => isLeft,
+        );
+        if (ended) state.value = ended;
       } catch (error) {
-        film.value = null;
+        state.value = null;
         throw error;
       }
     });
 
-  findJob({ session: setup.session, kind: "body-from-film" })
-    .then((job) => job && (isGoing(job) ? follow(async () => job) : into(film)(job)))
-    .catch(into(failed));
+  for (const [state, at, kind] of /** @type {const} */ ([
+    [film, FILMS, "body-from-film"],
+    [carried, CARRYINGS, "carry-clicks"],
+  ]))
+    findJob({ session: setup.session, kind })
+      .then((job) => {
+        if (isGoing(job)) follow(state, at, async () => job);
+        else state.value = job;
+      })
+      .catch(into(failed));
   load();
 
   return {
@@ -90,6 +111,7 @@ export function landmarksOf(setup, bodies, first) {
     chosen,
     camera,
     film,
+    carried,
     failed,
     keep,
     isOf,
@@ -107,9 +129,16 @@ export function landmarksOf(setup, bodies, first) {
     removeChosen: () => keep(clicks.value.filter((one) => !isOf(one, chosen.value))),
     /** @param {string} name */
     make: (name) =>
-      follow(async () => {
+      follow(film, FILMS, async () => {
         await saving;
         return post(`${here}/body-from-film`, { like: like.value, save_as: name, replace: true });
+      }),
+    /** A run by the body that was made of the clicks, else by the one whose tree is taken. @param {boolean} held */
+    carry: (held) =>
+      follow(carried, CARRYINGS, async () => {
+        await saving;
+        const body = film.value?.made?.saved || like.value;
+        return post(`${here}/carry-clicks`, { body, held });
       }),
     stop: () => {
       isLeft = true;
@@ -121,11 +150,13 @@ export function landmarksOf(setup, bodies, first) {
 
 /** What is made of the clicks. @param {{ model: Model }} properties */
 export function FilmPanel({ model }) {
-  const [clicks, film] = [model.clicks.value, model.film.value];
+  const [clicks, film, carried] = [model.clicks.value, model.film.value, model.carried.value];
   const frames = new Set(clicks.map((one) => one.frame)).size;
   const isClicking = model.isClicking.value;
-  const cancel = () => remove(`/api/bodies-from-film/${film?.identifier}`);
+  const cancel = () => remove(`${FILMS}/${film?.identifier}`);
+  const cancelRun = () => remove(`${CARRYINGS}/${carried?.identifier}`);
   const made = film?.state === "done" ? film.made : null;
+  const run = carried?.state === "done" ? carried : null;
   return html`<details class="background-quality" open=${clicks.length > 0 || isClicking}>
     <summary>A body from its film</summary>
     <div class="background-make">
@@ -156,6 +187,12 @@ export function FilmPanel({ model }) {
     }
     <${Failure} error=${model.failed.value} />
     ${made && html`<${Made} session=${model.setup.session} made=${made} />`}
+    ${
+      isGoing(carried)
+        ? html`<${Progress} ...${progressOf(carried, "beginning", cancelRun)} />`
+        : clicks.length > 0 && !isGoing(film) && html`<${Carrying} model=${model} />`
+    }
+    ${run && html`<${RunOfClicks} session=${model.setup.session} run=${run} />`}
     </div>
   </details>`;
 }
@@ -176,6 +213,34 @@ function Making({ model }) {
     </label>
     <div class="step-actions"><button type="submit">Make the body</button></div>
   </form>`;
+}
+
+/** How the clicks become a run. @param {{ model: Model }} properties */
+function Carrying({ model }) {
+  return html`<form
+    class="background-make"
+    onSubmit=${(event) => {
+      event.preventDefault();
+      model.carry(event.target.elements.held.checked);
+    }}
+  >
+    <p class="hint">
+      Where no mask shows the limbs, the clicked poses can be carried to the frames between by how
+      the limbs look: click every third frame or so, more where a limb swings. It takes some
+      seconds a frame.
+    </p>
+    <label class="check"><input type="checkbox" name="held" /> The body is held in one place</label>
+    <div class="step-actions"><button type="submit">Make a run of the clicks</button></div>
+  </form>`;
+}
+
+/** The run that was made. */
+function RunOfClicks(/** @type {{ session: string, run: Carried }} */ { session, run }) {
+  const query = new URLSearchParams({ session, run: run.run });
+  return html`
+    <p>Run <a href=${`/?${query}`}>${run.run}</a> is made: look through it in the studio.</p>
+    ${run.notes.map((words) => html`<p class="notice">${words}</p>`)}
+  `;
 }
 
 /** The body that was made. */
