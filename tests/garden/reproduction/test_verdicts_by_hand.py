@@ -148,11 +148,11 @@ def make_equal(document: dict) -> None:
         rows[f"{base}, crossed by parameters, chain, 10 pictures/s"][1:3] = ["63", "46"]
 
 
-def mix_signs(document: dict) -> None:
-    for table in document["tables"]:
-        for row in table["rows"]:
-            if table["title"] == "Sign tests":
-                row[1] = "6 : 4"
+def exchange_signs(document: dict) -> None:
+    """At 20 Hz seeds no longer agree, at 60 Hz all do."""
+    [signs] = [table for table in document["tables"] if table["title"] == "Sign tests"]
+    for row in signs["rows"]:
+        row[1] = "6 : 4" if row[0].startswith("swarm, 20 Hz") else "10 : 0"
 
 
 def lose_half(document: dict) -> None:
@@ -172,7 +172,7 @@ def gain_by_memory(document: dict) -> None:
     [
         ("deutscher-full-body", save_half, {"not reproduced"}),
         ("deutscher-crossover", make_equal, {"reproduced"}),
-        ("fleischmann-fig-6", mix_signs, {"undecided"}),
+        ("fleischmann-fig-6", exchange_signs, {"undecided", "not reproduced"}),
         ("caillette-fig-11", lose_half, {"undecided"}),
         ("caillette-fig-13", gain_by_memory, {"reproduced"}),
     ],
