@@ -5,7 +5,7 @@ import pytest
 from made_outlines import convex_corners, outlines_of
 from weighting_scene import inside_outline
 
-from studio.search.likelihood.occlusion_kernels import hidden_interval, sample_bits
+from studio.search.likelihood.occlusion_kernels import hidden_interval, limb_boxes, may_hide, sample_bits
 from studio.search.likelihood.visible_edges import hidden_samples
 
 MIDDLE = np.array([60.0, 40.0])
@@ -81,3 +81,24 @@ def test_samples_are_hidden_by_any_nearer_limb_that_is_seen(samples: int) -> Non
         apart, total = apart + np.count_nonzero(found != hidden), total + np.count_nonzero(hidden)
     assert total > 20 * samples
     assert apart <= 0.001 * total, "a sample to the last bit on an outline"
+
+
+def test_the_box_of_a_limb_holds_its_corners_and_says_what_may_hide_it() -> None:
+    rng = np.random.default_rng(5)
+    corners = convex_corners(rng, (16, 1, 6), MIDDLE, 60.0).astype(np.float32)
+    depth = rng.uniform(900.0, 1100.0, (16, 1, 6)).astype(np.float32)
+    outlines = outlines_of(corners.astype(float), np.ones((16, 1, 6)), depth.astype(float))
+    boxes = np.zeros((6, 80), np.float32)
+    limb_boxes(outlines, 0, 0, boxes)
+    least, largest = corners[:, 0].min(axis=2), corners[:, 0].max(axis=2)
+    wanted = np.stack(
+        [least[..., 0], largest[..., 0], least[..., 1], largest[..., 1], depth[:, 0]], axis=2
+    )  # (16, L, 5)
+    assert (boxes.reshape(6, 5, 16) == wanted.transpose(1, 2, 0)).all()
+    met = set[bool]()
+    for limb, other in np.ndindex(6, 6):
+        over = (least[:, limb] <= largest[:, other]) & (least[:, other] <= largest[:, limb])
+        wanted_here = bool((over.all(axis=1) & (depth[:, 0, other] < depth[:, 0, limb])).any())
+        assert may_hide(boxes[limb], boxes[other]) == wanted_here
+        met.add(wanted_here)
+    assert met == {False, True}
