@@ -1,5 +1,6 @@
 """Distances of pixels from the silhouette's border, and the border's points, for gradient-based refinement."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -156,10 +157,18 @@ def _distances(mask: NDArray[np.uint8]) -> Floats:
     OpenCV's last bits depend on the mask's memory address, and a descent amplifies them to millimetres. Squared
     distances between pixels are whole numbers, so the exact values are restored by rounding.
     """
-    distances = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    distances = _within_picture(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
     return np.sqrt(np.rint(distances * distances))
 
 
 def _stepped_distances(mask: NDArray[np.uint8]) -> Floats:
     """The same, summed over steps to neighbours and knights' moves (Borgefors 1986, 5 × 5)."""
-    return np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_5), dtype=np.float32)
+    return _within_picture(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_5))
+
+
+def _within_picture(distances: Array) -> Floats:
+    """The distances; where no pixel is 0, the picture's diagonal instead of what OpenCV says there, which is another
+    large number on each kind of processor.
+    """
+    found, diagonal = np.asarray(distances, dtype=np.float32), math.hypot(*distances.shape)
+    return np.full_like(found, diagonal) if found.size and found[0, 0] > 2.0 * diagonal else found

@@ -24,7 +24,7 @@ from studio.body.writing import body_text
 from studio.evidence.look_maps import look_maps
 from studio.footage.capture.footage import Footage
 from studio.foundations.arrays import Array, Floats, Indices
-from studio.foundations.declaring import Body, Seed
+from studio.foundations.declaring import LARGEST, Body, Seed
 from studio.foundations.errors import BodyError, RunError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.package import software_version
@@ -71,10 +71,14 @@ class CarryRequest:
     tolerance: Annotated[
         float, Field(gt=0.0, le=200.0, description="Pixels by which a click may miss its landmark.")
     ] = 10.0
-    first: Annotated[int | None, Field(ge=0, description="Default: the first clicked frame.")] = None
+    first: Annotated[int | None, Field(ge=0, le=LARGEST, description="Default: the first clicked frame.")] = (
+        None
+    )
     last: Annotated[
         int | None,
-        Field(ge=1, description="The frame after the last one; default: after the last clicked one."),
+        Field(
+            ge=1, le=LARGEST, description="The frame after the last one; default: after the last clicked one."
+        ),
     ] = None
     seed: Seed = 0
     name: Annotated[str, Field(description="Of the run (letters, digits, - and _); default: numbered.")] = ""

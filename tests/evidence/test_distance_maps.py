@@ -54,6 +54,11 @@ def test_the_pictures_own_border_and_empty_masks_have_no_points() -> None:
     assert distances_of(mask).border[:, 0].min() > 0
     for empty in (np.zeros((40, 50), np.uint8), np.full((40, 50), 255, np.uint8)):
         assert distances_of(empty).border.shape == (0, 2)
+    for exact in (True, False):
+        signed = distances_of(np.full((40, 50), 255, np.uint8), exact=exact).signed
+        assert (signed < 0.0).all()
+        assert np.isfinite(signed).all()
+        assert signed.min() >= -np.hypot(40, 50) - 1.0, "no farther than the picture is wide"
 
 
 def test_stepped_distances_are_nearly_the_exact_ones() -> None:

@@ -83,6 +83,7 @@ OTHERS = {
     "gallery": "makes a session",
     "edit-body": "bodies of the workspace",
     "body-from-film": "bodies of the workspace",
+    "carry-clicks": "minutes",
     "download": "from a store",
     "doctor": "no session",
     "bench": "minutes",

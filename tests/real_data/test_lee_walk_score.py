@@ -22,6 +22,7 @@ from studio.sessions.session import Session
 pytestmark = pytest.mark.real_data
 
 SEEDS = range(10)
+BEST_OF_CPP = 0.2955
 PLANNED = {"particles": 200, "adaptive_diffusion": False, "crossover": 0.0}
 
 
@@ -81,8 +82,8 @@ def test_the_filter_beats_the_benchmark_and_eq_13(lee_walk: LeeWalk) -> None:
     many = lee_walk.found({"layers": 5, "particles": 1000})
     for name, scores in (("10 × 200", improved), ("10 × 200, Eq. 13", planned), ("5 × 1000", many)):
         print(f"\n{name:18} {np.round(scores, 4)} mean {scores.mean():.4f} worst {scores.max():.4f}")
-    assert improved.max() <= 0.292
+    assert improved.max() < BEST_OF_CPP, "the worst seed beats the best run"
     assert improved.mean() <= 0.290
     # One of ten seeds may go the other way: a sign test's 1 %.
     assert (improved < planned).sum() >= 9
-    assert many.mean() < 0.2955
+    assert many.mean() < BEST_OF_CPP

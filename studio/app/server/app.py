@@ -148,6 +148,7 @@ JOBS: tuple[JobKind[Any], ...] = (
     view_routes.SPLIT,
     view_routes.UNCERTAINTY,
     film_routes.FILM,
+    film_routes.CARRIED,
     rig_routes.RIG,
     COMPARISON,
     LEARNING,
