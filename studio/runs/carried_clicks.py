@@ -53,7 +53,7 @@ FAR = 3
 AROUND = 0.6
 """Spread around the best poses, as a share of the round's."""
 DRAWN_TO = 0.05
-"""What a step of the largest size from a neighbouring frame costs, in units of `look_scores`, twice."""
+"""Twice what a step of the largest size away from a neighbouring frame costs, in units of `look_scores`."""
 SWEEPS = 1
 """Times that every frame is searched again."""
 MOVED = 1e-6
