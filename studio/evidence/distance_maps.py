@@ -170,5 +170,5 @@ def _within_picture(distances: Array) -> Floats:
     """The distances; where no pixel is 0, the picture's diagonal instead of what OpenCV says there, which is another
     large number on each kind of processor.
     """
-    found, diagonal = np.asarray(distances, dtype=np.float32), math.hypot(*distances.shape)
-    return np.full_like(found, diagonal) if found.size and found[0, 0] > 2.0 * diagonal else found
+    pixels, diagonal = np.asarray(distances, dtype=np.float32), math.hypot(*distances.shape)
+    return np.full_like(pixels, diagonal) if pixels.size and pixels[0, 0] > 2.0 * diagonal else pixels

@@ -7,7 +7,7 @@ from studio.evidence.edges import grey
 from studio.foundations.arrays import Bytes, Floats
 
 SMOOTHING, NEARBY = 1.5, 12.0
-"""Pixels: Gaussians that smooth the picture, and by which the usual slope near a pixel is found."""
+"""Pixels: Gaussians that smooth the picture, and by which the usual slope near a pixel is measured."""
 FAINT = 1.0
 """Grey levels per pixel: slopes below are noise."""
 

@@ -16,7 +16,7 @@ from studio.foundations.numba_in_threads import FAST, FAST_INLINED, njit
 ALONG, ACROSS = 14, 12
 """Places of a strip along and across its limb."""
 BEYOND = 0.15
-"""Share of the limb's length by which a strip begins before it and ends behind it, so that ends are told."""
+"""Share of the limb's length by which a strip begins before it and ends behind it, so that its ends are seen."""
 REACH, CORE = 2.2, 1.2
 """Half widths of the limb to which a strip reaches, and within which it mainly counts: a Gaussian's deviation."""
 FLAT = 2.0
