@@ -166,7 +166,7 @@ def _stepped_distances(mask: NDArray[np.uint8]) -> Floats:
     return _within_picture(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_5))
 
 
-def _within_picture(distances: Array) -> Floats:
+def _within_picture(distances: NDArray[np.generic]) -> Floats:
     """The distances; where no pixel is 0, the picture's diagonal instead of what OpenCV says there, which is another
     large number on each kind of processor.
     """
