@@ -73,8 +73,10 @@ def in_another(x, y, quads, usable, sides, boxes, own):
 def add_point(share, residual, nx, ny, first, second, u, normal, pull):
     """Add one residual to its limb's equations: it is that of the point at u between two corners, along (nx, ny).
 
-    normal : (8, 8), pull : (8,) over the limb's corners, x and y of each; `first` comes before `second`.
+    normal : (8, 8), its lower half, pull : (8,) over the limb's corners, x and y of each.
     """
+    if first > second:
+        first, second, u = second, first, 1.0 - u
     i, j = 2 * first, 2 * second
     ax, ay, bx, by = (1.0 - u) * nx, (1.0 - u) * ny, u * nx, u * ny
     scaled = share * residual

@@ -82,11 +82,6 @@ def by_plain_sums(view: View, ends: Array, slack: Array, part: float) -> tuple[f
         row = view.mm * normal @ slope
         gradient[:] += weight * residual * row
         matrix[:] += weight * np.outer(row, row)
-        if first > second:
-            # Of side B, which runs against the corners' order, the product of both corners is left out.
-            ahead, behind = ((1.0 - u) * view.slopes[limb, first], u * view.slopes[limb, second])
-            both = np.outer(normal @ ahead, normal @ behind)
-            matrix[:] -= weight * view.mm**2 * (both + both.T)
 
     def less(away: float, limb: int) -> float:
         return np.sign(away) * max(0.0, abs(away) - slack[limb])
