@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.evidence.floor_shadows import cell_size
 from studio.evidence.settings import EvidenceSettings
 from studio.foundations.arrays import Bytes, Floats
 from studio.foundations.numba_in_threads import EXACT, KERNEL, njit
@@ -40,11 +41,13 @@ frames twice more, so that updates already due and the order of a mixture's Gaus
 
 class Foreground(NamedTuple):
     """A picture's pixels before any clean-up, each (H, W) uint8, 0 or 255. mask : those that differ from the background
-    and are no shadow. shadow : those that differ and pass for a shadow.
+    and are no shadow. shadow : those that differ and pass for a shadow. brightness : (h, w) of the shadows in each of
+    `floor_shadows`' cells, as a share of the background's, 0 without any; None: it was not measured.
     """
 
     mask: Bytes
     shadow: Bytes
+    brightness: Floats | None = None
 
 
 class BackgroundModel(Protocol):
@@ -96,7 +99,15 @@ class GaussianBackground:
             np.float32(settings.mask_shadow_colour),
             settings.mask_shadow_window // 2,
         )
-        return Foreground(mask, changed - mask)
+        shadow = changed - mask
+        if not settings.mask_shadow_floor or not settings.mask_shadow_alike:
+            return Foreground(mask, shadow)
+        size = cell_size(*shadow.shape)
+        return Foreground(
+            mask,
+            shadow,
+            shadow_brightness(shadow, cv2.boundingRect(shadow), picture, self.mean, gain, size),
+        )
 
     def tests_shadows(self, settings: EvidenceSettings) -> bool:
         """Whether darker pixels may count as background: a grey picture has no colour to compare."""
@@ -414,3 +425,28 @@ def shadows_together(
             seen -= columns[0, x]
             wanted -= columns[1, x]
     return shadow
+
+
+@njit(**EXACT)
+def shadow_brightness(
+    shadow: Bytes,
+    place: Sequence[int],
+    picture: Bytes,
+    mean: NDArray[np.uint8 | np.float32],
+    gain: NDArray[np.float32],
+    size: int,
+) -> NDArray[np.float32]:
+    """(h, w) brightness of the shadow's pixels in each cell of `size` pixels a side, as a share of the background's; 0
+    without any. shadow : (H, W) above 0, inside `place`. picture, mean, gain : as in `differing_pixels`.
+    """
+    left, top, wide, high = place
+    rows, columns = -(-shadow.shape[0] // size), -(-shadow.shape[1] // size)
+    dots, norms = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.float32)
+    for y in range(top, top + high):
+        for x in range(left, left + wide):
+            if shadow[y, x]:
+                for c in range(3):
+                    background = gain[c] * np.float32(mean[y, x, c])
+                    dots[y // size, x // size] += np.float32(picture[y, x, c]) * background
+                    norms[y // size, x // size] += background * background
+    return dots / np.maximum(norms, np.float32(1.0))

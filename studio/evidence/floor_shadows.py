@@ -2,10 +2,10 @@
 """Which pixels that look like a shadow cannot be one: the floor that they would lie on is seen empty from elsewhere.
 
 The shadow test of one camera (`background`) cannot tell a forearm on a floor of its own colour from a darker floor. The
-other cameras can. A shadow on the floor z = 0 is changed for the cameras that see that place of the floor. Where all
-see the place unchanged, or it lies out of their sight, what hides it from the first camera may stand above the floor:
-on the pixel's ray, at a place that every camera sees changed. Pixels for which both holds are the subject's. All is
-decided on cells of some pixels.
+other cameras can. A shadow on the floor z = 0 is changed for the cameras that see that place of the floor, and as dark
+for them: a floor scatters light to all sides. Where none sees the place so, what hides it from the first camera may
+stand above the floor: on the pixel's ray, at a place that every camera sees changed. Pixels for which both holds are
+the subject's. All is decided on cells of some pixels.
 
 Where the floor is not at z = 0, as on a table or a stage, shadows would be taken for the subject. So where all that
 changed stays clearly above z = 0, the floor is what is lowest of it. Lengths are shares of the distance between the
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.volume.hull_projection import distorted
-from studio.foundations.arrays import Array, Bytes
+from studio.foundations.arrays import Array, Bytes, Floats
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.numba_in_threads import EXACT, njit
 
@@ -31,9 +31,11 @@ CELLS = 320
 CHANGED_SHARE, SHADOW_SHARE = 0.375, 0.5
 """Of a cell's area, so that it counts as changed; of what changed in it, so that it counts as like a shadow."""
 SAME, CHANGED, LIKE_SHADOW = 0, 1, 2
-STEP, ABOVE, FARTHEST = 0.012, 0.08, 1.5
-"""Shares of the distance: between places on a ray, of the lowest place above the floor, of the farthest from what the
-cameras look at."""
+STEP, FARTHEST = 0.012, 1.5
+"""Shares of the distance: between places on a ray, of the farthest from what the cameras look at."""
+ABOVE, CLEARLY_ABOVE = 0.03, 0.08
+"""Shares of the distance, above the floor, of the lowest place that may hide it: where brightness is compared, and
+where it is not, so that a shadow that some camera does not see is taken for one that lies there."""
 ALIKE = 0.01
 """Least mean square sine between the cameras' axes and any direction: below it, within 6 degrees, all look one way."""
 SEEING = 2
@@ -41,6 +43,8 @@ SEEING = 2
 PART = 0.06
 """Of a piece that looks like a shadow, so that any of it is the subject's: of a real shadow some places are hidden from
 the other cameras by things that stand on the floor."""
+NO_SHADOW, HIDDEN, SHADOW = 0, 1, 2
+"""What a camera sees of a place of the floor."""
 SAMPLED, LOWER, AROUND = 800, 0.03, 0.05
 """About so many changed cells tell where the scene is; which of their lowest places, in order of height, is the floor
 at most; share of the distance by which the scene is larger."""
@@ -50,21 +54,33 @@ FLOORS = -0.06, 0.06, 0.005
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells:
-    """A picture's cells. kinds : (h, w) SAME, CHANGED or LIKE_SHADOW. size : pixels along a cell's side."""
+    """A picture's cells. kinds : (h, w) SAME, CHANGED or LIKE_SHADOW. size : pixels along a cell's side. brightness :
+    (h, w) of what passes for shadow in a cell, as a share of the background's; 0 where it is not known.
+    """
 
     kinds: Bytes
     size: int
+    brightness: Floats
 
 
-def cells_of(mask: Bytes, shadow: Bytes | None) -> Cells:
-    """mask : (H, W) 0 or 255. shadow : (H, W) 255 where a pixel changed but passes for shadow; None: nowhere."""
+def cell_size(height: int, width: int) -> int:
+    """Pixels along the side of a picture's cells."""
+    return max(1, -(-max(height, width) // CELLS))
+
+
+def cells_of(mask: Bytes, shadow: Bytes | None, brightness: Floats | None = None) -> Cells:
+    """mask : (H, W) 0 or 255. shadow : (H, W) 255 where a pixel changed but passes for shadow; None: nowhere.
+    brightness : as in `Cells`; None: it is not known.
+    """
     height, width = mask.shape
-    size = max(1, -(-max(height, width) // CELLS))
+    size = cell_size(height, width)
     kinds = np.zeros((-(-height // size), -(-width // size)), np.uint8)
+    if brightness is None:
+        brightness = np.zeros(kinds.shape, np.float32)
     changed = mask if shadow is None else mask | shadow
     left, top, across, down = cv2.boundingRect(changed)
     if not across:
-        return Cells(kinds, size)
+        return Cells(kinds, size, brightness)
     # Whole cells around all that changed: a picture is mostly empty.
     left, top, right, bottom = (
         left // size,
@@ -89,7 +105,7 @@ def cells_of(mask: Bytes, shadow: Bytes | None) -> Cells:
         SAME,
         np.where(passing >= SHADOW_SHARE * everything, LIKE_SHADOW, CHANGED),
     )
-    return Cells(kinds, size)
+    return Cells(kinds, size, brightness)
 
 
 def with_cells(mask: Bytes, shadow: Bytes, chosen: Bytes, size: int) -> Bytes:
@@ -133,11 +149,13 @@ class FloorShadows:
         self._middle, self._distance = _middle_seen(
             centres, np.array([camera.rotation[2] for camera in cameras])
         )
-        self.usable = bool((centres[:, 2] > ABOVE * self._distance).all())
+        self.usable = bool((centres[:, 2] > CLEARLY_ABOVE * self._distance).all())
         self._rays = functools.cache(self._rays_of)
 
-    def unexplained(self, seen: Sequence[Cells]) -> list[Bytes]:
-        """For each camera (h, w) above 0 where a cell looks like a shadow and cannot be one. seen : one a camera."""
+    def unexplained(self, seen: Sequence[Cells], tolerance: float = 0.0) -> list[Bytes]:
+        """For each camera (h, w) above 0 where a cell looks like a shadow and cannot be one. seen : one a camera.
+        tolerance : by which the logarithms of a shadow's brightness differ between cameras at most, where it is known.
+        """
         kinds = [cells.kinds.ravel() for cells in seen]
         chosen = [np.zeros_like(cells.kinds) for cells in seen]
         like = [np.flatnonzero(own == LIKE_SHADOW) for own in kinds]
@@ -148,16 +166,24 @@ class FloorShadows:
         scene, least = self._scene(everything, seen, maps), min(SEEING, len(seen) - 1)
         if scene is None:
             return chosen
-        # A calibration is not exact: beside what has changed a place is not seen unchanged.
-        near = np.concatenate([_grown(cells.kinds).ravel() for cells in seen])
-        explained = on_floor(near, maps, self._views, owners, rays, 0.0)
+        bright = np.concatenate([cells.brightness.ravel() for cells in seen])
+        own = np.concatenate([cells.brightness.ravel()[at] for cells, at in zip(seen, like, strict=True)])
+
+        def shadows_at(height: float) -> NDArray[np.bool_]:
+            return on_floor(everything, bright, maps, self._views, owners, rays, own, tolerance, height)
+
+        explained = shadows_at(0.0)
         if scene[0, 2] > 0.0:
-            # The lowest of what changed is where the floor may be, give or take what no camera sees below it.
-            for height in scene[0, 2] + self._distance * np.arange(*FLOORS):
-                other = on_floor(near, maps, self._views, owners, rays, height)
-                if other.sum() > explained.sum():
-                    explained, scene[0, 2] = other, height
-        scene[0, 2] += ABOVE * self._distance
+            # The lowest of what changed is where the floor may be, give or take what no camera sees below it; where
+            # z = 0 explains more, what stands on it is hidden, or calibrations are off.
+            heights = scene[0, 2] + self._distance * np.arange(*FLOORS)
+            others = [shadows_at(height) for height in heights]
+            most = int(np.argmax([other.sum() for other in others]))
+            if others[most].sum() > explained.sum():
+                explained, scene[0, 2] = others[most], heights[most]
+            elif others[most].sum() < explained.sum():
+                scene[0, 2] = 0.0
+        scene[0, 2] += (ABOVE if tolerance else CLEARLY_ABOVE) * self._distance
         places = lowest_changed(
             everything, maps, self._views, owners, rays, explained, scene, STEP * self._distance, least
         )
@@ -194,7 +220,7 @@ class FloorShadows:
         around = AROUND * self._distance
         box = np.stack([places.min(axis=0) - around, places.max(axis=0) + around])
         lowest = float(np.quantile(places[:, 2], LOWER))
-        box[0, 2] = lowest if lowest > ABOVE * self._distance else 0.0
+        box[0, 2] = lowest if lowest > CLEARLY_ABOVE * self._distance else 0.0
         return box
 
     def _rays_through(
@@ -215,11 +241,6 @@ class FloorShadows:
         flat = cv2.undistortPoints(places[:, None], camera.matrix, camera.distortion)[:, 0]
         rays = np.column_stack([flat, np.ones(len(flat))]) @ camera.rotation
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
-
-
-def _grown(kinds: Bytes) -> Bytes:
-    """(h, w) cells with those beside changed ones."""
-    return np.asarray(cv2.dilate(kinds, np.ones((3, 3), np.uint8)), np.uint8)
 
 
 def _drop_lesser_parts(chosen: Bytes, kinds: Bytes) -> None:
@@ -253,31 +274,44 @@ def _maps(seen: Sequence[Cells]) -> NDArray[np.int64]:
 
 
 @njit(**EXACT)
+def cell_at(
+    maps: NDArray[np.int64], views: Array, other: int, x: float, y: float, z: float
+) -> tuple[int, int]:
+    """Row and column of the cell in which a camera sees a place (mm); -1, -1 where it does not. maps : of `_maps`.
+    views : (V, 26) K's rows, distortion, rotation, translation and centre.
+    """
+    view = views[other]
+    depth = view[17] * x + view[18] * y + view[19] * z + view[22]
+    if depth <= 0.0:
+        return -1, -1
+    across = (view[11] * x + view[12] * y + view[13] * z + view[20]) / depth
+    down = (view[14] * x + view[15] * y + view[16] * z + view[21]) / depth
+    xd, yd, radial = distorted(across, down, (view[6], view[7], view[8], view[9], view[10]))
+    if not radial > 0.0:
+        return -1, -1
+    _, high, wide, size = maps[other]
+    column = (view[0] * xd + view[1] * yd + view[2] + 0.5) / size
+    row = (view[4] * yd + view[5] + 0.5) / size
+    if not (0.0 <= column < wide and 0.0 <= row < high):
+        return -1, -1
+    return int(row), int(column)
+
+
+@njit(**EXACT)
 def seen_at(
     kinds: Bytes, maps: NDArray[np.int64], views: Array, owner: int, x: float, y: float, z: float, most: int
 ) -> tuple[int, int]:
     """How many other cameras than `owner` see a place (mm) changed, and how many unchanged, `most` of which end it.
-    maps : of `_maps`. views : (V, 26) K's rows, distortion, rotation, translation and centre.
+    maps, views : as of `cell_at`.
     """
     changed = unchanged = 0
     for other in range(len(maps)):
         if other == owner:
             continue
-        view = views[other]
-        depth = view[17] * x + view[18] * y + view[19] * z + view[22]
-        if depth <= 0.0:
+        row, column = cell_at(maps, views, other, x, y, z)
+        if row < 0:
             continue
-        across = (view[11] * x + view[12] * y + view[13] * z + view[20]) / depth
-        down = (view[14] * x + view[15] * y + view[16] * z + view[21]) / depth
-        xd, yd, radial = distorted(across, down, (view[6], view[7], view[8], view[9], view[10]))
-        if not radial > 0.0:
-            continue
-        begin, high, wide, size = maps[other]
-        column = (view[0] * xd + view[1] * yd + view[2] + 0.5) / size
-        row = (view[4] * yd + view[5] + 0.5) / size
-        if not (0.0 <= column < wide and 0.0 <= row < high):
-            continue
-        if kinds[begin + int(row) * wide + int(column)] == SAME:
+        if kinds[maps[other, 0] + row * maps[other, 2] + column] == SAME:
             unchanged += 1
             if unchanged == most:
                 break
@@ -287,20 +321,76 @@ def seen_at(
 
 
 @njit(**EXACT)
+def is_shadow_there(
+    kinds: Bytes,
+    brightness: Floats,
+    cells: NDArray[np.int64],
+    row: int,
+    column: int,
+    own: float,
+    tolerance: float,
+) -> int:
+    """What a camera sees of a place of the floor in its cell and in those around it, as no calibration is exact.
+
+    SHADOW : one that leaves a share `own` of the light, between the darkest and the lightest around give or take a
+    tolerance of logarithms; any where brightness is not known (0). HIDDEN : something else that changed, in the cell
+    itself or, where `own` is not known, around it. NO_SHADOW : neither. cells : row of `_maps`.
+    """
+    begin, high, wide, _ = cells
+    least, most, hidden = np.inf, 0.0, kinds[begin + row * wide + column] == CHANGED
+    for j in range(max(0, row - 1), min(high, row + 2)):
+        for i in range(max(0, column - 1), min(wide, column + 2)):
+            at = begin + j * wide + i
+            if kinds[at] == LIKE_SHADOW:
+                if own == 0.0 or brightness[at] == 0.0:
+                    return SHADOW
+                least, most = min(least, brightness[at]), max(most, brightness[at])
+            elif kinds[at] == CHANGED:
+                hidden |= own == 0.0
+    if most > 0.0 and np.log(least) - tolerance <= np.log(own) <= np.log(most) + tolerance:
+        return SHADOW
+    return HIDDEN if hidden else NO_SHADOW
+
+
+@njit(**EXACT)
 def on_floor(
-    kinds: Bytes, maps: NDArray[np.int64], views: Array, owners: NDArray[np.int64], rays: Array, height: float
+    kinds: Bytes,
+    brightness: Floats,
+    maps: NDArray[np.int64],
+    views: Array,
+    owners: NDArray[np.int64],
+    rays: Array,
+    own: Floats,
+    tolerance: float,
+    height: float,
 ) -> NDArray[np.bool_]:
-    """(K,) whether another camera sees the floor behind a cell, at a height (mm), changed. kinds : of all cells, those
-    beside changed ones too. maps, views : as of `seen_at`. owners : (K,) the cells' cameras. rays :
-    (K, 3).
+    """(K,) whether what is behind a cell on the floor, at a height (mm), may be shadow: some other camera sees one as
+    dark there, or the place is hidden from all that see it; where a cell's own brightness is not known that it
+    is hidden from one is enough. kinds, brightness : of all cells. maps, views : as of `cell_at`. owners : (K,) the
+    cells' cameras. rays : (K, 3). own : (K,) the cells' brightness. tolerance : as of `is_shadow_there`.
     """
     explained = np.zeros(len(rays), np.bool_)
     for k in range(len(rays)):
         ray, centre = rays[k], views[owners[k], 23:]
-        if ray[2] < 0.0:
-            along = (height - centre[2]) / ray[2]
-            x, y = centre[0] + along * ray[0], centre[1] + along * ray[1]
-            explained[k] = seen_at(kinds, maps, views, owners[k], x, y, height, len(maps))[0] > 0
+        if ray[2] >= 0.0:
+            continue
+        along = (height - centre[2]) / ray[2]
+        x, y = centre[0] + along * ray[0], centre[1] + along * ray[1]
+        hidden = denied = 0
+        for other in range(len(maps)):
+            if other == owners[k]:
+                continue
+            row, column = cell_at(maps, views, other, x, y, height)
+            if row < 0:
+                continue
+            there = is_shadow_there(kinds, brightness, maps[other], row, column, own[k], tolerance)
+            if there == SHADOW:
+                explained[k] = True
+                break
+            hidden += there == HIDDEN
+            denied += there == NO_SHADOW
+        else:
+            explained[k] = hidden > 0 and (own[k] == 0.0 or denied == 0)
     return explained
 
 

@@ -23,7 +23,7 @@ from studio.evidence.masks import PackedMask, cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.evidence.threshold import between_thresholds
 from studio.footage.capture.footage import Footage
-from studio.foundations.arrays import Bytes
+from studio.foundations.arrays import Bytes, Floats
 from studio.foundations.errors import FootageError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.tracing import span
@@ -41,12 +41,13 @@ class RawMask:
     """A camera's mask (H, W), 0 or 255, before its clean-up.
 
     to_clean : whether it is to be cleaned. shadow : (H, W), 255 where a pixel changed but passes for a shadow; None:
-    nowhere.
+    nowhere. brightness : of shadows, by cell, as in `Foreground`.
     """
 
     mask: Bytes
     to_clean: bool
     shadow: Bytes | None = None
+    brightness: Floats | None = None
 
 
 class PackedRaw:
@@ -55,10 +56,11 @@ class PackedRaw:
     def __init__(self, raw: RawMask) -> None:
         self._mask, self._to_clean = PackedMask(raw.mask), raw.to_clean
         self._shadow = None if raw.shadow is None else PackedMask(raw.shadow)
+        self._brightness = raw.brightness
 
     def unpacked(self) -> RawMask:
         shadow = None if self._shadow is None else self._shadow.unpacked()
-        return RawMask(self._mask.unpacked(), self._to_clean, shadow)
+        return RawMask(self._mask.unpacked(), self._to_clean, shadow, self._brightness)
 
 
 class EvidenceMaker:
@@ -157,13 +159,15 @@ class EvidenceMaker:
         """Keep what the other cameras' masks of the frame need of a camera, so that these can be made without it."""
         if self._tests_floor():
             raw = raw or self.raw_mask(camera, frame, self.footage.picture(camera, frame))
-            self._cells[camera, frame] = cells_of(raw.mask, raw.shadow)
+            self._cells[camera, frame] = cells_of(raw.mask, raw.shadow, raw.brightness)
 
     def without_false_shadows(self, raw: Mapping[str, RawMask]) -> dict[str, RawMask]:
         """A frame's masks by camera, with what looked like shadows but cannot be any on the floor."""
         if not self._tests_floor() or all(one.shadow is None for one in raw.values()):
             return dict(raw)
-        return self._without(raw, {name: cells_of(one.mask, one.shadow) for name, one in raw.items()})
+        return self._without(
+            raw, {name: cells_of(one.mask, one.shadow, one.brightness) for name, one in raw.items()}
+        )
 
     def _tests_floor(self) -> bool:
         return self.settings.mask_shadow_test and self.settings.mask_shadow_floor
@@ -178,7 +182,9 @@ class EvidenceMaker:
             for name, one in raw.items()
         ):
             return dict(raw)
-        chosen = dict(zip(seen, tells.unexplained(tuple(seen.values())), strict=True))
+        chosen = dict(
+            zip(seen, tells.unexplained(tuple(seen.values()), self.settings.mask_shadow_alike), strict=True)
+        )
         return {
             name: one
             if one.shadow is None
@@ -231,7 +237,8 @@ class EvidenceMaker:
         kind: FittedKind = KINDS.get(choice, "gaussian")
         model = self._backgrounds.model(camera, kind)
         found = model.foreground(picture, self.settings)
-        return RawMask(found.mask, True, found.shadow if self.settings.mask_shadow_test else None)
+        shadow = found.shadow if self.settings.mask_shadow_test else None
+        return RawMask(found.mask, True, shadow, found.brightness)
 
     def finished_mask(self, camera: str, raw: RawMask) -> Bytes:
         """(H, W) 0 or 255: a raw mask, cleaned if `to_clean`, without excluded areas."""

@@ -94,6 +94,15 @@ class EvidenceSettings:
         help="What looks like a shadow is none if another camera sees the floor there empty and something above the"
         " floor can be what all cameras see. Needs two cameras or more above a floor at z = 0.",
     )
+    mask_shadow_alike: float = next_frame_knob(
+        0.1,
+        0.0,
+        1.0,
+        0.01,
+        label="shadows alike within",
+        help="A shadow on the floor is as dark for every camera: what differs by more than about this share from what"
+        " the others see there is none. 0 = it is not asked.",
+    )
     mask_darkest: int = next_frame_knob(
         128,
         0,

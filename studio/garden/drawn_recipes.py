@@ -60,6 +60,19 @@ SURFACE_LIGHT = (0.55, 0.85)
 CLOTH_LIGHTS = ((0.0, 0.5), (0.2, 0.65), (0.5, 0.75), (0.85, 0.85))
 """The same for cloth, from its dark side to its bright one."""
 
+FLOOR, WALL = "floor", "wall"
+POORLY_SEEN: tuple[Mapping[str, str], ...] = (
+    {"skin": FLOOR},
+    {"shirt": WALL, "stripes": WALL},
+    {"trousers": FLOOR},
+    {"skin": FLOOR, "shirt": WALL},
+    {"shirt": FLOOR, "trousers": FLOOR},
+    {"shirt": WALL, "trousers": WALL},
+)
+"""What is worn in the colour of which surface; stripes that are not named keep theirs."""
+ALIKE = (0.85, 1.15)
+"""Brightness of such clothes, in shares of the surface's."""
+
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
@@ -268,6 +281,20 @@ def drawn_recipe(half: str, kind: str) -> Recipe:
     if damage.missing:
         damage = msgspec.structs.replace(damage, missing=(cameras[-1].name,))
     return msgspec.structs.replace(recipe, cameras=Cameras(placed=cameras), damage=damage)
+
+
+def poorly_seen(recipe: Recipe, number: int) -> Recipe:
+    """The recipe with clothes in the colours of its drawn room's floor or of a wall, as POORLY_SEEN has them."""
+    rng = np.random.default_rng((recipe.seed, number))
+    floor, *walls = room_called(recipe.room).blocks[:FLOOR_AND_WALLS]
+    colours = dict(recipe.colours)
+    for material, surface in POORLY_SEEN[number % len(POORLY_SEEN)].items():
+        block = floor if surface == FLOOR else walls[int(rng.integers(len(walls)))]
+        behind = np.array(block.colour if rng.random() < 0.5 else block.second)
+        alike = np.clip(behind * rng.uniform(*ALIKE) + rng.normal(0.0, 0.01, 3), 0.03, 0.9)
+        red, green, blue = (round(float(value), 3) for value in alike)
+        colours[material] = (red, green, blue)
+    return msgspec.structs.replace(recipe, title=f"{recipe.title}, poorly seen", colours=colours)
 
 
 def recipe_text(half: str, kind: str) -> str:

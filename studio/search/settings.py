@@ -24,7 +24,12 @@ DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region-silhouette"
 # Knobs of older records: the new name, and the new value where an old one is gone.
 RENAMED: dict[str, tuple[str, dict[object, Value]]] = {"limits": ("constraints", {"reflect": "clamp"})}
 # Knobs that older records do not have, as those runs were tracked.
-BEFORE: dict[str, Value] = {"refine_frames": False, "mask_shadow_window": 1, "mask_shadow_floor": False}
+BEFORE: dict[str, Value] = {
+    "refine_frames": False,
+    "mask_shadow_window": 1,
+    "mask_shadow_floor": False,
+    "mask_shadow_alike": 0.0,
+}
 # Knobs that are gone; what they did cannot be done again.
 GONE = ("mask_shadow_learnt",)
 JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}

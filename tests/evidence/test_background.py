@@ -16,6 +16,7 @@ from studio.evidence.background import (
     gaussian_from_frames,
     gaussian_from_median,
     possible_shadows,
+    shadow_brightness,
     shadows_together,
 )
 from studio.evidence.settings import EvidenceSettings
@@ -287,6 +288,19 @@ def test_what_may_be_shadow_is_darker_and_of_the_backgrounds_colour(seed: int) -
     expected = np.zeros_like(possible)
     expected[3:10, 4:13] = possible[3:10, 4:13]
     np.testing.assert_array_equal(part, expected)
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_a_cells_shadow_is_as_bright_as_its_pixels_are_beside_the_background(size: int) -> None:
+    picture, mean, changed = shaded(5)
+    brightness = shadow_brightness(changed, box_of(changed), picture, mean, GAIN, size)
+    assert brightness.shape == (-(-18 // size), -(-23 // size))
+    for row, column in np.ndindex(*brightness.shape):
+        place = np.s_[row * size : (row + 1) * size, column * size : (column + 1) * size]
+        pixels = changed[place] > 0
+        wanted = (GAIN * mean[place]).astype(float)[pixels]
+        share = (picture[place][pixels] * wanted).sum() / (wanted**2).sum() if pixels.any() else 0.0
+        assert brightness[row, column] == pytest.approx(share, rel=1e-5)
 
 
 @pytest.mark.parametrize("reach", [1, 2, 7])

@@ -10,7 +10,6 @@ from studio.evidence.floor_shadows import (
     Cells,
     FloorShadows,
     _drop_lesser_parts,
-    _grown,
     _maps,
     _middle_seen,
     cells_of,
@@ -23,6 +22,11 @@ from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 
 CAMERAS = ring_of_cameras(4, 640, 480)
+
+
+def not_measured(kinds: np.ndarray, size: int) -> Cells:
+    """Cells whose brightness is not known."""
+    return Cells(kinds, size, np.zeros(kinds.shape, np.float32))
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
@@ -137,7 +141,7 @@ def lowered(camera: Camera) -> np.ndarray:
 
 def test_a_shadow_that_only_one_camera_films_stays_one() -> None:
     """No other camera can deny it."""
-    alone = [Cells(np.zeros((240, 320), np.uint8), 2) for _ in CAMERAS]
+    alone = [not_measured(np.zeros((240, 320), np.uint8), 2) for _ in CAMERAS]
     alone[0].kinds[200:210, 5:15] = 2
     assert not any(one.any() for one in FloorShadows(CAMERAS).unexplained(alone))
 
@@ -205,7 +209,7 @@ def views_of(cameras: tuple[Camera, ...]) -> np.ndarray:
 def random_cells(seed: int, share: float = 0.5) -> list[Cells]:
     rng = np.random.default_rng(seed)
     return [
-        Cells(
+        not_measured(
             (rng.random((-(-20 // side), -(-24 // side))) < share).astype(np.uint8) * rng.integers(1, 3), side
         )
         for side in SIDES
@@ -263,20 +267,121 @@ def random_rays(count: int) -> tuple[np.ndarray, np.ndarray]:
     return owners, rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
+def cell_around(one: Cells, camera: Camera, place: np.ndarray) -> tuple[slice, slice] | None:
+    """Rows and columns of the cell in which a camera sees a place and those beside it; None where it does not."""
+    x, y, depth = camera.rotation @ place + camera.translation
+    square = (x * x + y * y) / depth**2
+    k1, k2, _, _, k3 = camera.distortion
+    if depth <= 0.0 or 1.0 + k1 * square + k2 * square**2 + k3 * square**3 <= 0.0:
+        return None
+    pixel = np.nan_to_num(project(camera, place)[0], nan=-99.0).clip(-99.0, 99.0)
+    column, row = np.floor((pixel + 0.5) / one.size).astype(int)
+    if not (0 <= column < one.kinds.shape[1] and 0 <= row < one.kinds.shape[0]):
+        return None
+    return slice(max(0, row - 1), row + 2), slice(max(0, column - 1), column + 2)
+
+
+def plainly_explained(
+    cells: list[Cells], owner: int, place: np.ndarray, own: float, tolerance: float
+) -> bool:
+    denied, hidden = 0, 0
+    for number, (camera, one) in enumerate(zip(SMALL, cells, strict=True)):
+        around = None if number == owner else cell_around(one, camera, place)
+        if around is None:
+            continue
+        kinds, light = one.kinds[around], one.brightness[around]
+        if own == 0.0:
+            if kinds.any():
+                return True
+            continue
+        like = kinds == 2
+        if like.any():
+            logs = np.log(light[like])
+            if logs.min() - tolerance <= np.log(own) <= logs.max() + tolerance:
+                return True
+        middle = cell_middle(one, camera, place)
+        hidden += middle == 1
+        denied += middle != 1
+    return hidden > 0 and denied == 0
+
+
+def cell_middle(one: Cells, camera: Camera, place: np.ndarray) -> int:
+    column, row = np.floor((project(camera, place)[0] + 0.5) / one.size).astype(int)
+    return int(one.kinds[row, column])
+
+
 @pytest.mark.parametrize("height", [0.0, 300.0])
-def test_the_floor_explains_a_cell_where_another_camera_sees_it_changed(height: float) -> None:
+@pytest.mark.parametrize("known", [False, True])
+def test_the_floor_explains_a_cell_where_another_camera_sees_a_shadow_as_dark(
+    height: float, known: bool
+) -> None:
+    """Or, where the cell's own brightness is not known, anything that changed."""
     owners, rays = random_rays(300)
-    for share in (0.2, 1.0):
-        cells = random_cells(1, share)
-        kinds = np.concatenate([one.kinds.ravel() for one in cells])
-        explained = on_floor(kinds, _maps(cells), views_of(SMALL), owners, rays, height)
+    rng = np.random.default_rng(9)
+    own = rng.uniform(0.4, 1.0, 300).astype(np.float32) * known
+    for share in (0.1, 0.9):
+        cells = [
+            Cells(
+                np.where(rng.random(one.kinds.shape) < share, rng.integers(1, 3, one.kinds.shape), 0).astype(
+                    np.uint8
+                ),
+                one.size,
+                rng.uniform(0.4, 1.0, one.kinds.shape).astype(np.float32),
+            )
+            for one in random_cells(1)
+        ]
+        kinds, light = (
+            np.concatenate([getattr(one, name).ravel() for one in cells]) for name in ("kinds", "brightness")
+        )
+        explained = on_floor(kinds, light, _maps(cells), views_of(SMALL), owners, rays, own, 0.05, height)
         expected = []
-        for owner, ray in zip(owners, rays, strict=True):
+        for owner, ray, mine in zip(owners, rays, own, strict=True):
             centre = SMALL[owner].centre
             place = centre + (height - centre[2]) / ray[2] * ray
-            expected.append(ray[2] < 0.0 and plainly_seen(cells, int(owner), place, 9)[0] > 0)
+            expected.append(ray[2] < 0.0 and plainly_explained(cells, int(owner), place, float(mine), 0.05))
         np.testing.assert_array_equal(explained, expected)
-        assert 20 < np.count_nonzero(expected) < 280
+        assert 5 < np.count_nonzero(expected) < 290
+
+
+LEG = box((-120.0, -120.0, 150.0), (120.0, 120.0, 500.0))
+
+
+@pytest.mark.parametrize("alike", [False, True])
+def test_a_leg_before_a_shadow_that_is_not_as_dark_is_the_subjects(alike: bool) -> None:
+    """It stands in its own shadow, so that all cameras see the floor behind it changed."""
+    upper = [drawn(camera, box((-150.0, -150.0, 500.0), (150.0, 150.0, 1700.0))) for camera in CAMERAS]
+    legs = [drawn(camera, LEG) & ~own for camera, own in zip(CAMERAS, upper, strict=True)]
+    around = [
+        drawn(camera, box((-850.0, -850.0, 0.0), (850.0, 850.0, 0.0))) & ~own & ~leg
+        for camera, own, leg in zip(CAMERAS, upper, legs, strict=True)
+    ]
+    seen = []
+    for own, leg, shadow in zip(upper, legs, around, strict=True):
+        like = leg | shadow
+        cells = cells_of(own, like)
+        small = cv2.resize(leg, cells.kinds.shape[::-1], interpolation=cv2.INTER_AREA)
+        light = np.where(small > 127, 0.6 if alike else 0.9, 0.6).astype(np.float32)
+        seen.append(cells_of(own, like, np.where(cells.kinds == 2, light, 0.0).astype(np.float32)))
+    tells, shares = FloorShadows(CAMERAS), []
+    for tolerance in (0.1, 0.0):
+        chosen = tells.unexplained(seen if tolerance else [without(one) for one in seen], tolerance)
+        masks = [
+            with_cells(np.zeros_like(own), leg | shadow, cell, one.size)
+            for own, leg, shadow, cell, one in zip(upper, legs, around, chosen, seen, strict=True)
+        ]
+        shares += [
+            sum(int((mask & part).sum()) for mask, part in zip(masks, parts, strict=True))
+            / sum(int(part.sum()) for part in parts)
+            for parts in (legs, around)
+        ]
+    leg, shadow, before, shadow_before = shares
+    assert before < 0.05
+    assert max(shadow, shadow_before) < 0.01
+    assert leg < 0.05 if alike else leg > 0.75
+
+
+def without(cells: Cells) -> Cells:
+    return not_measured(cells.kinds, cells.size)
 
 
 @pytest.mark.parametrize("least", [1, 2])
@@ -306,7 +411,7 @@ def test_cells_rays_pass_through_their_middles() -> None:
     mild = (small(1, 0.1), small(2, 0.1))
     tells, cells = (
         FloorShadows(mild),
-        [Cells(np.zeros((10, 12), np.uint8), 2), Cells(np.zeros((7, 8), np.uint8), 3)],
+        [not_measured(np.zeros((10, 12), np.uint8), 2), not_measured(np.zeros((7, 8), np.uint8), 3)],
     )
     owners, rays = tells._rays_through(cells, [np.array([5, 13, 117]), np.array([0, 9, 33, 55])])
     assert owners.tolist() == [0, 0, 0, 1, 1, 1, 1]
@@ -329,11 +434,6 @@ def test_pieces_of_which_too_little_is_chosen_are_dropped() -> None:
     wanted = np.zeros_like(kinds)
     wanted[3, 21:24] = 1
     np.testing.assert_array_equal(chosen, wanted)
-    speck = np.zeros((7, 7), np.uint8)
-    speck[3, 3] = 2
-    assert _grown(speck).tolist() == [
-        [2 if 2 <= x <= 4 and 2 <= y <= 4 else 0 for x in range(7)] for y in range(7)
-    ]
 
 
 def test_the_middle_is_where_the_axes_meet() -> None:
@@ -387,5 +487,5 @@ def test_the_scene_is_around_what_changed_from_the_floor_upwards() -> None:
         np.testing.assert_allclose(scene, wanted)
         assert abs(scene[0, 2] - raised) < 60.0
         np.testing.assert_allclose(scene[0, :2], (150.0 - around, -350.0 - around), atol=150.0)
-    nothing = [Cells(np.zeros((240, 320), np.uint8), 2) for _ in CAMERAS]
+    nothing = [not_measured(np.zeros((240, 320), np.uint8), 2) for _ in CAMERAS]
     assert FloorShadows(CAMERAS)._scene(np.zeros(4 * 240 * 320, np.uint8), nothing, _maps(nothing)) is None

@@ -36,6 +36,7 @@ const FIRST = [
   "mask_shadow_colour",
   "mask_shadow_window",
   "mask_shadow_floor",
+  "mask_shadow_alike",
   "mask_opening",
   "mask_closing",
   "mask_keep_components",

@@ -106,15 +106,15 @@ def person_of_recipe(
     return recipe_motion(changed, path.parent, skeleton)
 
 
-def person_renderer(recipe: Path | str) -> tuple[Renderer, tuple[Camera, ...], int]:
-    """What draws the person of a recipe into its pictures, the cameras, the number of frames. Raises StudioError."""
-    path = find_recipe(recipe)
-    parsed = read_recipe(path)
-    rng = np.random.default_rng(parsed.seed)
-    skeleton, _ = recipe_person(parsed, path.parent, rng)
-    cameras = cameras_left(_cameras(parsed, path.parent, rng), parsed.damage.missing)
-    motion = recipe_motion(parsed, path.parent, skeleton)
-    return recipe_renderer(parsed, motion, cameras), cameras, motion.frame_count
+def person_renderer(recipe: Recipe, folder: Path) -> tuple[Renderer, tuple[Camera, ...], int]:
+    """What draws the person of a recipe into its pictures, the cameras, the number of frames. folder : the recipe
+    file's. Raises StudioError.
+    """
+    rng = np.random.default_rng(recipe.seed)
+    skeleton, _ = recipe_person(recipe, folder, rng)
+    cameras = cameras_left(_cameras(recipe, folder, rng), recipe.damage.missing)
+    motion = recipe_motion(recipe, folder, skeleton)
+    return recipe_renderer(recipe, motion, cameras), cameras, motion.frame_count
 
 
 def render_source(

@@ -119,8 +119,7 @@ class Renderer:
     def picture(self, camera: int, frame: int, shadow: tuple[Floats, Floats]) -> tuple[Bytes, Bytes]:
         """(H, W, 3) BGR picture and (H, W) mask, 255 where the person covers half a pixel or more."""
         view = self._views[camera]
-        key, ambient = (_at_places(grid, view.shadow_place) for grid in shadow)
-        light = view.key * key[..., None] + view.ambient * ambient[..., None]
+        light = self._shaded(view, shadow)
         mask = np.zeros(view.depth.shape, np.uint8)
         tables = self._tables[frame]
         window = _window(view.camera, tables.reshape(-1, tables.shape[-1]))
@@ -135,6 +134,18 @@ class Renderer:
             light[rows, columns] += person
             mask[rows, columns] = np.where(coverage >= 0.5, 255, 0)
         return self._developed(light, camera, frame), mask
+
+    def shaded(self, camera: int, shadow: tuple[Floats, Floats]) -> Floats:
+        """(H, W) share of the room's light that the shadow leaves, 0...1."""
+        view = self._views[camera]
+        share: Floats = self._shaded(view, shadow).sum(axis=-1) / (view.key + view.ambient).sum(axis=-1)
+        return share
+
+    def _shaded(self, view: _View, shadow: tuple[Floats, Floats]) -> Floats:
+        """(H, W, 3) light of the room in a shadow."""
+        key, ambient = (_at_places(grid, view.shadow_place) for grid in shadow)
+        light: Floats = view.key * key[..., None] + view.ambient * ambient[..., None]
+        return light
 
     def _person(self, view: _View, table: Array, rows: slice, columns: slice) -> tuple[Floats, Floats]:
         """Light (h, w, 3) and coverage (h, w) of the person at one moment inside a window."""

@@ -9,7 +9,16 @@ import pytest
 
 from studio.body.person import joint_points
 from studio.foundations.geometry.projection import project
-from studio.garden.drawn_recipes import CHOOSING, HALVES, KINDS, REPORTING, clip_names, recipe_text
+from studio.garden.drawn_recipes import (
+    CHOOSING,
+    HALVES,
+    KINDS,
+    POORLY_SEEN,
+    REPORTING,
+    clip_names,
+    poorly_seen,
+    recipe_text,
+)
 from studio.results.drawing_footage.recipe_file import (
     RECIPES,
     RECORDED,
@@ -124,3 +133,22 @@ def test_the_20_hz_walk_has_every_third_frame_of_the_60_hz_one(
         skeleton, _ = recipe_person(recipe, RECIPES, np.random.default_rng(recipe.seed))
         roots.append(recipe_motion(recipe, RECIPES, skeleton).root)
     np.testing.assert_allclose(roots[0][::3], roots[1], atol=2.0)
+
+
+@pytest.mark.parametrize("number", range(len(POORLY_SEEN)))
+def test_who_is_poorly_seen_wears_the_colours_of_floor_and_walls(number: int) -> None:
+    recipe = read_recipe(find_recipe("choosing-arms"))
+    floor, *walls = room_called(recipe.room).blocks[:5]
+    changed = poorly_seen(recipe, number)
+    assert changed == poorly_seen(recipe, number)
+    for material, colour in changed.colours.items():
+        surface = POORLY_SEEN[number].get(material)
+        if surface is None:
+            assert colour == recipe.colours[material]
+            continue
+        blocks = [floor] if surface == "floor" else walls
+        surfaces = np.array([side for block in blocks for side in (block.colour, block.second)])
+        shares = (surfaces @ colour) / (surfaces**2).sum(axis=1)
+        away = np.linalg.norm(colour - shares[:, None] * surfaces, axis=1)
+        alike = (away < 0.06) & (shares > 0.8) & (shares < 1.2)
+        assert alike.any(), (material, shares, away)

@@ -48,6 +48,7 @@ from studio.results.comparison.findings import Table
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.statistics import number
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
+from studio.results.drawing_footage.recipe_file import find_recipe, read_recipe
 from studio.results.drawing_footage.recipes import person_renderer
 from studio.runs.search_space import search_space, session_sigma
 from studio.search.likelihood.blobs import ExpectedBlobs
@@ -97,7 +98,8 @@ def measure_carving(arguments: Mapping[str, Any], cache: FootageCache) -> dict[s
     silhouettes, share missed, share added.
     """
     del cache
-    renderer, cameras, frames = person_renderer(arguments["drawn"])
+    path = find_recipe(arguments["drawn"])
+    renderer, cameras, frames = person_renderer(read_recipe(path), path.parent)
     seed = int(arguments["seed"])
     chosen = evenly_spread(frames, 10 * DRAWN_FRAMES)[seed % 10 :: 10]
     settings = HullSettings(**{name: value for name, value in AS_PRINTED.items() if name.startswith("hull_")})
