@@ -95,7 +95,8 @@ class Stretch:
 class Kind:
     """A kind of difficulty: `frames` frames at `fps` of a stretch a half, seen by `cameras` cameras (by half). damage :
     as in a recipe, a half; `missing` names the last camera where it is not empty. noise : of the sensor, 0 for a draw.
-    like : a kind whose draw this one shares at another rate.
+    like : a kind whose draw this one shares at another rate. worn : what has the colour of which surface, as in
+    POORLY_SEEN.
     """
 
     title: str
@@ -106,6 +107,7 @@ class Kind:
     damage: tuple[Damage, Damage] = (Damage(), Damage())
     noise: float = 0.0
     like: str = ""
+    worn: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
 HARD = Damage(clutter=HARD_CLUTTER, calibration_px=HARD_PX)
@@ -250,6 +252,30 @@ KINDS: Mapping[str, Kind] = {
         90,
         (BOX, replace(RUNNING, options={**RUNNING.options, "radius_mm": (950.0, 1150.0)})),
     ),
+    "skin-on-floor": Kind(
+        "Dance, skin of the floor's colour, 30 Hz",
+        30,
+        60,
+        (_shown("05_03.amc", 0.3, 0.1), _shown("05_02.amc", 0.5, 0.2)),
+        worn={"skin": FLOOR},
+    ),
+    "shirt-on-wall": Kind(
+        "Walk with turns, shirt of a wall's colour, 30 Hz",
+        30,
+        60,
+        (
+            Stretch("turning_walk", options={"start_s": (2.2, 2.6), **TURNING}),
+            Stretch("turning_walk", options={"start_s": (1.4, 1.8), **TURNING}),
+        ),
+        worn={"shirt": WALL, "stripes": WALL},
+    ),
+    "trousers-on-floor": Kind(
+        "Run, trousers of the floor's colour, 60 Hz",
+        60,
+        60,
+        (RUNNING, replace(RUNNING, options={**RUNNING.options, "radius_mm": (900.0, 1150.0)})),
+        worn={"trousers": FLOOR},
+    ),
 }
 
 
@@ -280,21 +306,22 @@ def drawn_recipe(half: str, kind: str) -> Recipe:
     damage = chosen.damage[index]
     if damage.missing:
         damage = msgspec.structs.replace(damage, missing=(cameras[-1].name,))
-    return msgspec.structs.replace(recipe, cameras=Cameras(placed=cameras), damage=damage)
+    recipe = msgspec.structs.replace(recipe, cameras=Cameras(placed=cameras), damage=damage)
+    return poorly_seen(recipe, chosen.worn) if chosen.worn else recipe
 
 
-def poorly_seen(recipe: Recipe, number: int) -> Recipe:
-    """The recipe with clothes in the colours of its drawn room's floor or of a wall, as POORLY_SEEN has them."""
-    rng = np.random.default_rng((recipe.seed, number))
+def poorly_seen(recipe: Recipe, worn: Mapping[str, str]) -> Recipe:
+    """The recipe with clothes in the colours of its drawn room's floor or of a wall. worn : one of POORLY_SEEN."""
+    rng = np.random.default_rng((recipe.seed, len(worn)))
     floor, *walls = room_called(recipe.room).blocks[:FLOOR_AND_WALLS]
     colours = dict(recipe.colours)
-    for material, surface in POORLY_SEEN[number % len(POORLY_SEEN)].items():
+    for material, surface in worn.items():
         block = floor if surface == FLOOR else walls[int(rng.integers(len(walls)))]
         behind = np.array(block.colour if rng.random() < 0.5 else block.second)
         alike = np.clip(behind * rng.uniform(*ALIKE) + rng.normal(0.0, 0.01, 3), 0.03, 0.9)
         red, green, blue = (round(float(value), 3) for value in alike)
         colours[material] = (red, green, blue)
-    return msgspec.structs.replace(recipe, title=f"{recipe.title}, poorly seen", colours=colours)
+    return msgspec.structs.replace(recipe, colours=colours)
 
 
 def recipe_text(half: str, kind: str) -> str:

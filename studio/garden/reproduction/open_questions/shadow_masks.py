@@ -22,7 +22,7 @@ from studio.footage.capture.pictures import read_picture
 from studio.footage.capture.video import VideoReader, measure_video
 from studio.foundations.arrays import Bytes, evenly_spread
 from studio.foundations.geometry.camera import Camera
-from studio.garden.drawn_recipes import CHOOSING, KINDS, clip_name, poorly_seen
+from studio.garden.drawn_recipes import CHOOSING, KINDS, POORLY_SEEN, clip_name, poorly_seen
 from studio.garden.reproduction.drawing import heat_chart
 from studio.garden.reproduction.experiment import Part, listed
 from studio.garden.reproduction.open_questions.other_people import ELSEWHERE, imported
@@ -63,8 +63,9 @@ shadows are not known has none."""
 
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
-    """A trial a clip; no seed changes a mask. A clip that differs from another only in its rate is left out."""
-    drawn = [clip_name(CHOOSING, kind) for kind, made in KINDS.items() if not made.like]
+    """A trial a clip; no seed changes a mask. A clip that shares another's draw, or is poorly seen as it is,
+    is left out."""
+    drawn = [clip_name(CHOOSING, kind) for kind, made in KINDS.items() if not (made.like or made.worn)]
     others = [PREFIX + place for place in ELSEWHERE.values() if (real_data_folder() / place).is_dir()]
     if scale.quick:
         drawn, others = drawn[:2], []
@@ -72,7 +73,10 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
         [Trial(clip, {"clip": clip, "set": OTHERS}) for clip in others]
         + [Trial(clip, {"clip": clip, "set": PLAIN}) for clip in drawn]
         + [
-            Trial(f"{clip}, {POOR}", {"clip": clip, "set": POOR, "number": number})
+            Trial(
+                f"{clip}, {POOR}",
+                {"clip": clip, "set": POOR, "worn": dict(POORLY_SEEN[number % len(POORLY_SEEN)])},
+            )
             for number, clip in enumerate(drawn)
         ]
     )
@@ -90,7 +94,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         path = find_recipe(clip)
         recipe = read_recipe(path)
         if arguments["set"] == POOR:
-            recipe = poorly_seen(recipe, int(arguments["number"]))
+            recipe = poorly_seen(recipe, arguments["worn"])
         cameras, frames = _drawn_frames(recipe, path.parent)
     counted = {name: np.zeros(5, np.int64) for name in CHOICES}
     tells = floor_shadows(cameras)
