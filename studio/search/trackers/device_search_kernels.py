@@ -79,6 +79,22 @@ def weight_of(cumulated, first, n):
     return cumulated[first + n] - (cumulated[first + n - 1] if n > 0 else 0.0)
 
 
+@cuda.jit(device=True)
+def fill_normals(seed, frame, layer, particle, size, normals):
+    """Fill the first `size` of normals (WIDEST,) with a particle's independent normal numbers, four at a time."""
+    for d in range(0, size, 4):
+        a, b, c, e = random_words(seed, frame, layer, particle, OF_NOISE + d)
+        one, two = as_normals(a, b)
+        three, four = as_normals(c, e)
+        normals[d] = one
+        if d + 1 < size:
+            normals[d + 1] = two
+        if d + 2 < size:
+            normals[d + 2] = three
+        if d + 3 < size:
+            normals[d + 3] = four
+
+
 def anneal_weights(weights, count, dials, annealed, cumulated):
     """β with which a share WANTED of each run's particles survives (Eq. 3, 11, 12), at most UTMOST, or KNOWN where that
     is a number; the weights cumulated (R N,).
@@ -347,17 +363,7 @@ def spread(centres, moments, root, dials, keys, limits, count, poses):
     of_sample, correlated = dials[run, OF_SAMPLE] > 0.0, dials[run, CORRELATED] > 0.0
     normals = cuda.local.array(WIDEST, np.float32)
     size = poses.shape[0]
-    for d in range(0, size, 4):
-        a, b, c, e = random_words(seed, frame, layer, n, OF_NOISE + d)
-        one, two = as_normals(a, b)
-        three, four = as_normals(c, e)
-        normals[d] = one
-        if d + 1 < size:
-            normals[d + 1] = two
-        if d + 2 < size:
-            normals[d + 2] = three
-        if d + 3 < size:
-            normals[d + 3] = four
+    fill_normals(seed, frame, layer, n, size, normals)
     for d in range(size):
         value = normals[d]
         if correlated:

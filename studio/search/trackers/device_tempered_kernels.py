@@ -25,7 +25,6 @@ from studio.search.trackers.counted_numbers import (
     OF_NOISE,
     OF_PARENTS,
     OF_RUN,
-    as_normals,
     as_share,
     random_words,
 )
@@ -45,6 +44,7 @@ from studio.search.trackers.device_search_kernels import (
     WANTED,
     WEIGHTED,
     add_up,
+    fill_normals,
     particle_at,
     weight_of,
 )
@@ -428,17 +428,7 @@ def propose_moves(
         kinds[at], partners[at], back[at] = EXCHANGE, partner, 0.0
         return
     normals = cuda.local.array(WIDEST, np.float32)
-    for d in range(0, size, 4):
-        a, b, c, e = random_words(seed, frame, layer, n, OF_NOISE + d)
-        one, two = as_normals(a, b)
-        three, four = as_normals(c, e)
-        normals[d] = one
-        if d + 1 < size:
-            normals[d + 1] = two
-        if d + 2 < size:
-            normals[d + 2] = three
-        if d + 3 < size:
-            normals[d + 3] = four
+    fill_normals(seed, frame, layer, n, size, normals)
     partners[at] = n
     if as_share(lots[1]) < rules[LIMB_MOVES]:
         chosen, many = 1 + np.int64(as_share(lots[2]) * limbs), 0
