@@ -316,9 +316,13 @@ def _propose_moves(
 
 
 def _normal_of(weighted: ParticleSet) -> Spread:
-    """Noise about the mean of a weighted set, once a particle, with its covariance."""
-    weights = np.exp(weighted.log_weights)
+    """Noise about the mean of a weighted set, once a particle, with its covariance. What is equal in all particles has
+    exactly none.
+    """
+    weights, first = np.exp(weighted.log_weights), weighted.poses[0]
     mean = weights @ weighted.poses
+    # Weights sum to 1 but for rounding, of which densities of moves would take the last digit for a deviation.
+    mean = np.where((weighted.poses == first).all(axis=0), first, mean)
     away = weighted.poses - mean
     deviation = np.sqrt(weights @ (away * away))
     # Scaled to unit variances first: millimetres beside radians would drown the small pivots.

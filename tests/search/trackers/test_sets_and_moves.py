@@ -333,11 +333,14 @@ def test_steps_and_walks_are_noise_with_the_weighted_sets_covariance() -> None:
     np.testing.assert_allclose(made.extra[tempered.BACK], back, atol=1e-6)
 
 
-def test_directions_without_noise_stay_and_have_no_part_in_a_density() -> None:
+@pytest.mark.parametrize("value", [4.0, 0.1, -1.7])
+def test_directions_without_noise_stay_and_have_no_part_in_a_density(value: float) -> None:
+    """A weighted mean of equal numbers is another number by rounding, of most."""
     particles = weighted_set(1, 40, 3)
-    particles.poses[:, 1] = 4.0
+    particles.poses[:, 1] = value
     normal = tempered._normal_of(particles)
-    assert (normal.draw(NUMBERS)[:, 1] == 4.0).all()
+    assert (normal.draw(NUMBERS)[:, 1] == value).all()
+    assert normal.deviation[1] == 0.0
     weights = np.exp(particles.log_weights)
     covariance = np.cov(particles.poses[:, [0, 2]].T, aweights=weights, bias=True)
     own = multivariate_normal(weights @ particles.poses[:, [0, 2]], covariance).logpdf(
@@ -345,6 +348,9 @@ def test_directions_without_noise_stay_and_have_no_part_in_a_density() -> None:
     )
     found = tempered._log_normal(particles.poses, normal)
     np.testing.assert_allclose(found - found[0], own - own[0], atol=1e-6)
+    nudged = particles.poses.copy()
+    nudged[::2, 1] = np.nextafter(value, np.inf)
+    np.testing.assert_allclose(tempered._log_normal(nudged, normal), found, atol=1e-12)
 
 
 @pytest.mark.parametrize("temper", [0.3, 1.0])
