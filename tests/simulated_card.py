@@ -1,9 +1,13 @@
 """Numba's simulator of a graphics card, in a process of its own."""
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 import studio
 
@@ -24,3 +28,8 @@ def run_simulated(script: Path, place: Path) -> Path:
     done = subprocess.run(words, env={**os.environ, **simulator}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return place
+
+
+def found_simulated(script: Path, folders: pytest.TempPathFactory) -> Any:  # noqa: ANN401
+    """What a script that pickles what a card gives has found."""
+    return pickle.loads(run_simulated(script, folders.mktemp(script.stem) / "found.pickle").read_bytes())

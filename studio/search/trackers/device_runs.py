@@ -20,7 +20,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, Mask
 from studio.foundations.numba_on_devices import cuda, record_launches
 from studio.search.likelihood.device_weighing import WeighingDevice
 from studio.search.trackers import device_search_kernels, device_swarm_kernels, device_tempered_kernels
@@ -217,10 +217,30 @@ class LayersAhead(ABC, Generic[Set]):
 
 
 def limits_there(space: SearchSpace, kept: bool) -> Array:
-    """(2, D) lowest and highest values as a card has them, infinite where limits are not kept."""
-    if kept:
-        return np.stack([inwards(space.lower, np.inf), inwards(space.upper, -np.inf)])
-    return np.array([[-np.inf], [np.inf]]).repeat(len(space.names), axis=1)
+    """(2, D) lowest and highest values as a card has them, infinite where limits are not kept. Between limits that
+    leave single precision no room lies its number nearest to the lower one.
+    """
+    if not kept:
+        return np.array([[-np.inf], [np.inf]]).repeat(len(space.names), axis=1)
+    there = np.stack([inwards(space.lower, np.inf), inwards(space.upper, -np.inf)])
+    there[:, without_room(space)] = space.lower[without_room(space)].astype(np.float32)
+    return there
+
+
+def without_room(space: SearchSpace) -> Mask:
+    """(D,) whether no number of single precision lies within a parameter's limits."""
+    return inwards(space.lower, np.inf) > inwards(space.upper, -np.inf)
+
+
+def put_within(poses: Array, space: SearchSpace) -> Array:
+    """Poses (..., D) of a card, in which parameters whose limits leave single precision no room are set on these
+    limits where the card had them as near as it can.
+    """
+    narrow = without_room(space)
+    if narrow.any():
+        own, lower, upper = poses[..., narrow], space.lower[narrow], space.upper[narrow]
+        poses[..., narrow] = np.where(own == lower.astype(np.float32), np.clip(own, lower, upper), own)
+    return poses
 
 
 def inwards(limits: Array, towards: float) -> Array:

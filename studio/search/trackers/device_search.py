@@ -30,6 +30,7 @@ from studio.search.trackers.device_runs import (
     Moment,
     kernel,
     limits_there,
+    put_within,
 )
 from studio.search.trackers.device_search_kernels import (
     ANNEALED,
@@ -258,13 +259,14 @@ class DeviceFilter(DeviceRuns):
         for own, raw, (beta, _, most, total, _) in zip(
             poses, values, self._fetched(there.annealed), strict=True
         ):
-            given.append(ParticleSet(own, -beta * (most - raw) - math.log(total), raw))
+            log_weights = -beta * (most - raw) - math.log(total)
+            given.append(ParticleSet(put_within(own, self.space), log_weights, raw))
         return given
 
     def _given(self, poses: Any) -> list[Array]:  # noqa: ANN401
         """Poses (D, R N) there as each run's (N, D) on the host."""
         runs = np.split(self._fetched(poses).T.astype(np.float64), self.runs)
-        return [np.ascontiguousarray(own) for own in runs]
+        return [put_within(np.ascontiguousarray(own), self.space) for own in runs]
 
     def means(self) -> Array:
         """(R, D) weighted means (Eq. 8) of the layer last done, where it was measured."""

@@ -28,6 +28,7 @@ from studio.search.trackers.device_runs import (
     Moment,
     kernel,
     limits_there,
+    put_within,
 )
 from studio.search.trackers.device_search_kernels import (
     DIFFUSED,
@@ -259,6 +260,9 @@ class DeviceSwarm(DeviceRuns):
         places, velocities, bests, leaders, starts = (
             np.split(self._fetched(array).T.astype(np.float64), self.runs) for array in arrays
         )
+        for runs in (places, bests, leaders, starts):
+            for own in runs:
+                put_within(own, self.space)
         reached = np.split(self._fetched(there.reached), self.runs, axis=1)
         standing = self._fetched(there.standing)
         none = np.zeros((2, 0))

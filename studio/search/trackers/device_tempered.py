@@ -274,15 +274,6 @@ class DeviceLadder(DeviceFilter):
             given.append(unweighted(own, extra))
         return given
 
-    def _given(self, poses: Any) -> list[Array]:  # noqa: ANN401
-        """Without the rounding of parameters that have no room, which the processor would find beyond their limits."""
-        runs = super()._given(poses)
-        fixed = self.space.lower == self.space.upper
-        value = self.space.lower[fixed]
-        for own in runs:
-            own[:, fixed] = np.where(own[:, fixed] == value.astype(np.float32), value, own[:, fixed])
-        return runs
-
     def _records_of(
         self,
         sent: Mapping[str, NDArray[Any]],
@@ -355,15 +346,9 @@ class DeviceLadder(DeviceFilter):
 
 
 def limits_of(space: SearchSpace, *, kept: bool) -> tuple[Array, Array]:
-    """(2, D) lowest and highest values, and the same as a card has them, infinite where limits are not kept. Between
-    limits that leave single precision no room lies its nearest number.
-    """
+    """(2, D) lowest and highest values, and the same as a card has them, infinite where limits are not kept."""
     there = limits_there(space, kept)
-    none = there[0] > there[1]
-    there[:, none] = space.lower[none].astype(np.float32)
-    if not kept:
-        return there.copy(), there
-    return np.stack([space.lower, space.upper]).astype(np.float64), there
+    return np.stack([space.lower, space.upper]).astype(np.float64) if kept else there.copy(), there
 
 
 @dataclass(frozen=True, slots=True, eq=False)

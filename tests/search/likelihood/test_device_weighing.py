@@ -1,15 +1,14 @@
 """Weighing on a card: in Numba's simulator against the processor, every kernel as PTX, and where there is no card."""
 
 import importlib
-import inspect
 import re
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numba
 import numpy as np
 import pytest
+from compiled_card import FLAG, GENERATIONS, LONG, SINGLE, compiled, kernels_of, needs_compilers, of_type
 from simulated_card import run_simulated
 from simulated_weighing import FEW_WORDS, SAMPLES, SCENES, scene_of, terms_of
 from weighting_scene import four_cameras, smooth_evidence
@@ -70,28 +69,22 @@ def test_a_cards_terms_are_the_processors(simulated, scene):
         assert expected["projected"].min() > 32 * FEW_WORDS, "the union does not fit the words"
 
 
-def of_type(kind, dimensions=1):
-    return numba.types.Array(numba.typeof(np.zeros(1, kind)).dtype, dimensions, "C")
-
-
 def signatures():
     """Every kernel of the modules for cards, by name, and the types that it is called with."""
     weighing = importlib.import_module("studio.search.likelihood.device_weighing_kernels")
     searching = importlib.import_module("studio.search.trackers.device_search_kernels")
-    whole, single = numba.types.int64, numba.types.float32
-    flag = numba.types.boolean
     table = numba.typeof(camera_table(four_cameras(), outward_limit, np.float32))
     numbers, f4, f8, u8 = of_type("i4"), of_type("f4", 2), of_type("f8", 2), of_type("u8", 2)
     moments = of_type("f8", 3)
     places = of_type("i4", 3)
     terms = (
-        f4, numbers, f4, numbers, table, places, of_type("u1"), of_type("u4"), whole, single, of_type("f4", 3),
+        f4, numbers, f4, numbers, table, places, of_type("u1"), of_type("u4"), LONG, SINGLE, of_type("f4", 3),
     )  # fmt: skip
     found = {
         "turn_poses": (weighing.turn_poses, (f4, f4)),
         "weigh_poses": (
             weighing.weigh_poses,
-            (of_type("f4", 3), places, whole, of_type("f8"), of_type("f8"), f8),
+            (of_type("f4", 3), places, LONG, of_type("f8"), of_type("f8"), f8),
         ),
         "find_frames": (
             weighing.frames_kernel(15)[0].py_func,
@@ -102,43 +95,27 @@ def signatures():
         kernel = weighing.terms_kernel(10, 1, 1, areas, occlusion).py_func
         found[f"add_terms, areas {areas}, occlusion {occlusion}"] = kernel, terms
     of_a_layer = {
-        "anneal_weights": (f8, whole, f8, f8, of_type("f8")),
-        "carry_over": (f4, whole, of_type("f8"), u8, whole, flag, f8, whole, f4),
-        "draw_survivors": (f4, of_type("f8"), u8, whole, flag, f8, of_type("i8"), f4, of_type("i4", 2)),
-        "find_moments": (f4, whole, whole, moments),
-        "find_weighted_moments": (f4, of_type("f8"), whole, moments),
-        "find_correlations": (f4, whole, moments, moments),
+        "anneal_weights": (f8, LONG, f8, f8, of_type("f8")),
+        "carry_over": (f4, LONG, of_type("f8"), u8, LONG, FLAG, f8, LONG, f4),
+        "draw_survivors": (f4, of_type("f8"), u8, LONG, FLAG, f8, of_type("i8"), f4, of_type("i4", 2)),
+        "find_moments": (f4, LONG, LONG, moments),
+        "find_weighted_moments": (f4, of_type("f8"), LONG, moments),
+        "find_correlations": (f4, LONG, moments, moments),
         "find_root": (moments,),
-        "spread": (f4, moments, moments, f8, u8, f8, whole, f4),
-        "take_rows": (f4, f8, f8, whole, whole, moments, moments),
+        "spread": (f4, moments, moments, f8, u8, f8, LONG, f4),
+        "take_rows": (f4, f8, f8, LONG, LONG, moments, moments),
     }
     found |= {name: (getattr(searching, name), types) for name, types in of_a_layer.items()}
     for module in (weighing, searching):
-        own = {
-            name
-            for name, one in inspect.getmembers(module, inspect.isfunction)
-            if one.__module__ == module.__name__
-        }
-        assert own - {"frames_kernel", "terms_kernel"} <= set(found), "a kernel that is not compiled here"
+        own = kernels_of(module) - {"frames_kernel", "terms_kernel"}
+        assert own <= set(found), "a kernel that is not compiled here"
     return found
 
 
-@pytest.mark.skipif(
-    sys.version_info >= (3, 12) or sys.platform != "linux",
-    reason="NVIDIA's compilers are locked for one Python",
-)
-@pytest.mark.parametrize("capability", [(8, 0), (9, 0)])
+@needs_compilers
+@pytest.mark.parametrize("capability", GENERATIONS)
 def test_every_kernel_compiles_for_a_card(monkeypatch, capability):
-    """PTX for two generations of cards, made without one by NVIDIA's compilers, which `make env` installs."""
-    dispatching = importlib.import_module("numba.cuda.dispatcher")
-    device = SimpleNamespace(compute_capability=capability)
-    monkeypatch.setattr(dispatching, "get_current_device", lambda: device)
-    cuda = importlib.import_module("studio.foundations.numba_on_devices").cuda
-    for name, (kernel, types) in signatures().items():
-        ptx = cuda.compile_ptx(kernel, numba.types.void(*types), cc=capability)[0]
-        assert f".target sm_{capability[0]}{capability[1]}" in ptx
-        assert ".entry" in ptx
-        assert "call" not in ptx, f"every helper of {name} is compiled into it"
+    for name, ptx in compiled(monkeypatch, capability, signatures()).items():
         if name.startswith("add_terms"):
             assert "fma.rn.f32" in ptx
             assert "div.s64" not in ptx, "indices stay unsigned"

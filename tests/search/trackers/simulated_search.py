@@ -3,11 +3,8 @@ they give to the file named."""
 
 import dataclasses
 import sys
-from pathlib import Path
 
 import numpy as np
-
-sys.path.append(str(Path(__file__).parents[1] / "likelihood"))
 from simulated_weighing import scene_of, wait_politely
 
 from studio.body.catalogue import load_body

@@ -61,6 +61,7 @@ SCENARIOS = {
 }
 SAMPLES = {"edge_samples": 16, "region_samples": 16}
 PULLS = (2.05, 2.4, 3.0)
+NO_ROOM = 0.1
 
 
 def values_of(poses: np.ndarray, seen: str = ALL) -> np.ndarray:
@@ -89,8 +90,10 @@ class NumpyDevice:
 class ToyProblem:
     """The same weighing here and there. there : whether a device weighs."""
 
-    def __init__(self, *, there: bool = True, device: NumpyDevice | None = None) -> None:
-        self.there, self.device = there, device or NumpyDevice()
+    def __init__(
+        self, *, there: bool = True, device: NumpyDevice | None = None, space: SearchSpace = SPACE
+    ) -> None:
+        self.there, self.device, self.space = there, device or NumpyDevice(), space
 
     def on_device(self) -> Any:  # noqa: ANN401
         frame = SimpleNamespace(observed=[0], memory=0, scale=1.0)
@@ -108,7 +111,7 @@ class ToyProblem:
     log_likelihood = fitness
 
     def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
-        return ((SPACE.lower <= poses) & (poses <= SPACE.upper)).all(axis=1)
+        return ((self.space.lower <= poses) & (poses <= self.space.upper)).all(axis=1)
 
 
 def contents(there: Any) -> dict[str, np.ndarray]:  # noqa: ANN401
@@ -165,12 +168,26 @@ def searched(
     for on_device in there:
         if search is None or resumed:
             search = FrameSearch(ParticleSwarm(), previous, space, seed=5, frame=2, repeats=2, state=state)
-        problem = ToyProblem(there=on_device, device=None if resumed else device)
+        problem = ToyProblem(there=on_device, device=None if resumed else device, space=space)
         records.append(search.step(problem, 0, settings))
         if resumed:
             state = search.state
             sets.append(state.particles)
     return {"records": records, "sets": sets, "result": search.result()}
+
+
+def without_room(constraints: str, *, there: bool) -> dict[str, Any]:
+    """A frame in which the last but one parameter has no room, at a number that single precision does not have."""
+    fixed = np.arange(SIZE) == SIZE - 2
+    space = dataclasses.replace(
+        SPACE,
+        lower=np.where(fixed, NO_ROOM, SPACE.lower),
+        upper=np.where(fixed, NO_ROOM, SPACE.upper),
+        sigma=np.where(fixed, 0.0, SPACE.sigma),
+    )
+    settings = dataclasses.replace(SETTINGS, constraints=constraints)
+    start = start_of(tuple(np.where(fixed, NO_ROOM, INSIDE)))
+    return searched(settings, (there,) * 14, space, start)
 
 
 def together(runs: tuple[int, ...]) -> dict[int, list[LayerRecord]]:
@@ -228,6 +245,7 @@ def everything() -> dict[str, Any]:
         "in turns": searched(SETTINGS, (True, False, False, True) * 3 + (False, True), resumed=True),
         "begun by the processor": searched(SETTINGS, space=bounded, start=FilterState(None), resumed=True),
         "together": (together((0, 1, 2)), together((0,)) | together((1,)) | together((2,))),
+        "without room": {rule: without_room(rule, there=True) for rule in ("clamp", "redraw")},
         "weighed there": weighed_there(),
     }
 

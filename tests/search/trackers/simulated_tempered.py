@@ -27,10 +27,11 @@ from studio.search.trackers import (
     device_tempered,
     device_tempered_kernels,
 )
+from studio.search.trackers.annealed_particle_filter import AnnealedParticleFilter
 from studio.search.trackers.frame_loop import FrameSearch, SearchState, search_together
-from studio.search.trackers.settings import TemperedSettings
+from studio.search.trackers.settings import AnnealedSettings, TemperedSettings
 from studio.search.trackers.tempered import TemperedFilter
-from studio.search.trackers.tracker import FilterState, LayerRecord, SearchSpace, start_of
+from studio.search.trackers.tracker import AnyTracker, FilterState, LayerRecord, SearchSpace, start_of
 
 SIZE, COUNT, LAYERS = 6, 20, 6
 SPACE = dataclasses.replace(
@@ -108,17 +109,20 @@ class ValuedProblem(Bowl):
 
 
 def tracked(
-    settings: tuple[TemperedSettings, ...],
+    settings: tuple[Any, ...],
     *,
     there: bool = True,
     space: SearchSpace = SPACE,
     start: FilterState | None = None,
     repeats: int = 1,
+    tracker: AnyTracker | None = None,
 ) -> dict[str, Any]:
     """Frames of a run. settings : of each. there : whether a device does them."""
     problem, previous, records = ValuedProblem(space, there=there), start or start_of(tuple(START)), []
     for frame, of_frame in enumerate(settings):
-        search = FrameSearch(TemperedFilter(), previous, space, seed=5, frame=frame, repeats=repeats)
+        search = FrameSearch(
+            tracker or TemperedFilter(), previous, space, seed=5, frame=frame, repeats=repeats
+        )
         while not search.finished:
             records.append(search.step(problem, 0, of_frame))
         previous = search.result().carried
@@ -165,6 +169,16 @@ def fixed_space() -> SearchSpace:
     )
 
 
+WITHOUT_ROOM: dict[str, dict[str, Any]] = {
+    "tempered": {"settings": (SETTINGS,), "space": fixed_space()},
+    "annealed": {
+        "settings": (AnnealedSettings(layers=3, particles=8),),
+        "space": fixed_space(),
+        "tracker": AnnealedParticleFilter(),
+    },
+}
+
+
 def weighed_there() -> dict[str, Any]:
     """A frame of a body that the device's own kernels weigh."""
     body, cameras, evidence, poses = scene_of("planar_arm4")
@@ -190,7 +204,7 @@ def everything() -> dict[str, Any]:
         "resumed": layer_by_layer((True,) * LAYERS),
         "in turns": layer_by_layer((True, False, True, True, False, True)),
         "together": (together((0, 1)), together((0,)) | together((1,))),
-        "without room": tracked((SETTINGS,), space=fixed_space()),
+        "without room": {name: tracked(**given) for name, given in WITHOUT_ROOM.items()},
         "weighed there": weighed_there(),
     }
 

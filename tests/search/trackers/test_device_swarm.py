@@ -3,50 +3,44 @@ frame whose swarm stays there, goes to the processor and comes back.
 """
 
 import dataclasses
-import importlib
-import inspect
-import pickle
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
-from simulated_card import run_simulated
+import simulated_swarm as made
+from compiled_card import FLAG, GENERATIONS, LONG, compiled, kernels_of, needs_compilers, of_type
+from simulated_card import found_simulated
+from simulated_weighing import scene_of
 
-HERE = Path(__file__).parent
-sys.path.append(str(HERE.parent / "likelihood"))
-import simulated_swarm as made  # noqa: E402
-from simulated_weighing import scene_of  # noqa: E402
-
-from studio.search.likelihood.edge_region_silhouette import (  # noqa: E402
+from studio.search.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
     EdgeRegionSilhouetteSettings,
 )
-from studio.search.trackers import device_swarm_kernels  # noqa: E402
-from studio.search.trackers.constraints import MOST_REDRAWS  # noqa: E402
-from studio.search.trackers.counted_numbers import as_normals, as_share, random_words  # noqa: E402
-from studio.search.trackers.device_search_kernels import BEST, MOST  # noqa: E402
-from studio.search.trackers.device_swarm_kernels import (  # noqa: E402
+from studio.search.trackers import device_swarm_kernels
+from studio.search.trackers.constraints import MOST_REDRAWS
+from studio.search.trackers.counted_numbers import as_normals, as_share, random_words
+from studio.search.trackers.device_search_kernels import BEST, MOST
+from studio.search.trackers.device_swarm_kernels import (
     OF_TRIES,
     OF_TRY,
     OF_VELOCITIES,
     POSSIBLE,
     VALUE,
 )
-from studio.search.trackers.particle_swarm import (  # noqa: E402
+from studio.search.trackers.particle_swarm import (
     BEST_POSES,
+    BEST_POSSIBLE,
     BEST_VALUES,
     FREEDOM,
     LEADER,
+    LEADER_POSSIBLE,
     LEADER_VALUE,
     VELOCITIES,
     ParticleSwarm,
     constriction,
 )
-from studio.search.trackers.swarm_settings import SwarmSettings  # noqa: E402
+from studio.search.trackers.swarm_settings import SwarmSettings
 
 INNER = (np.float32(made.SPACE.lower), np.float32(made.SPACE.upper))
 INNER[1][2] = np.nextafter(INNER[1][2], np.float32(0.0))
@@ -57,9 +51,7 @@ EXACT = {"rtol": 3e-7, "atol": 2e-7}
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What swarms do in a process whose device is simulated."""
-    place = tmp_path_factory.mktemp("swarm") / "found.pickle"
-    run_simulated(HERE / "simulated_swarm.py", place)
-    return pickle.loads(place.read_bytes())
+    return found_simulated(Path(made.__file__), tmp_path_factory)
 
 
 class Written:
@@ -262,6 +254,25 @@ def test_a_frame_is_the_processors_but_for_rounding(simulated: dict[str, Any], n
         np.testing.assert_array_equal(one.log_weights, other.log_weights)
 
 
+@pytest.mark.parametrize("constraints", ["clamp", "redraw"])
+def test_limits_without_room_for_single_precision_leave_poses_possible(
+    simulated: dict[str, Any], constraints: str
+) -> None:
+    """A parameter that is fixed at 0.1, which a card does not have: its number nearest to it is within the limits
+    there, and 0.1 itself is what goes on elsewhere.
+    """
+    there, here = simulated["without room"][constraints], made.without_room(constraints, there=False)
+    for one, other in zip(there["records"], here["records"], strict=True):
+        np.testing.assert_array_equal(one.poses[:, -2], np.float32(made.NO_ROOM))
+        np.testing.assert_allclose(one.poses, other.poses, atol=3e-6)
+        assert one.variance_weighed[-2] == one.variance_diffused[-2] == 0.0
+    last = there["result"].carried.particles
+    assert last.extra[BEST_POSSIBLE].all()
+    assert last.extra[LEADER_POSSIBLE].all()
+    for poses in (last.poses, last.extra[BEST_POSES], last.extra[LEADER][None]):
+        np.testing.assert_array_equal(poses[:, -2], made.NO_ROOM)
+
+
 def test_frames_of_runs_side_by_side_are_those_of_the_runs_alone(simulated: dict[str, Any]) -> None:
     beside, alone = simulated["together"]
     for run in range(3):
@@ -356,30 +367,17 @@ def test_joint_limits_alone_are_kept_there(knobs: dict[str, Any], fits: bool) ->
     assert ParticleSwarm().fits_device(0, made.SPACE, SwarmSettings(**knobs), {}) == fits
 
 
-@pytest.mark.skipif(
-    sys.version_info >= (3, 12) or sys.platform != "linux",
-    reason="NVIDIA's compilers are locked for one Python",
-)
-@pytest.mark.parametrize("capability", [(8, 0), (9, 0)])
+@needs_compilers
+@pytest.mark.parametrize("capability", GENERATIONS)
 def test_every_kernel_compiles_for_a_card(
     monkeypatch: pytest.MonkeyPatch, capability: tuple[int, int]
 ) -> None:
-    """PTX for two generations of cards, made without one by NVIDIA's compilers, which `make env` installs."""
-    dispatching = importlib.import_module("numba.cuda.dispatcher")
-    device = SimpleNamespace(compute_capability=capability)
-    monkeypatch.setattr(dispatching, "get_current_device", lambda: device)
-    cuda = importlib.import_module("studio.foundations.numba_on_devices").cuda
-    f4, f8, u8 = (numba.types.Array(numba.from_dtype(np.dtype(kind)), 2, "C") for kind in ("f4", "f8", "u8"))
-    whole, flag = numba.types.int64, numba.types.boolean
+    f4, f8, u8 = (of_type(kind, 2) for kind in ("f4", "f8", "u8"))
     signatures = {
-        "find_bests": (f4, f8, whole, f8, whole, f4, f8, f4, f8),
-        "line_up": (f4, f8, u8, whole, f4, f4, f8, f4, f8),
-        "step_swarm": (f4, f4, f4, f4, f8, u8, f8, flag, flag, whole, f4, f4),
+        "find_bests": (f4, f8, LONG, f8, LONG, f4, f8, f4, f8),
+        "line_up": (f4, f8, u8, LONG, f4, f4, f8, f4, f8),
+        "step_swarm": (f4, f4, f4, f4, f8, u8, f8, FLAG, FLAG, LONG, f4, f4),
     }
-    own = inspect.getmembers(device_swarm_kernels, inspect.isfunction)
-    assert {name for name, one in own if one.__module__ == device_swarm_kernels.__name__} == set(signatures)
-    for name, types in signatures.items():
-        kernel = getattr(device_swarm_kernels, name)
-        ptx = cuda.compile_ptx(kernel, numba.types.void(*types), cc=capability)[0]
-        assert ".entry" in ptx
-        assert "call" not in ptx, f"every helper of {name} is compiled into it"
+    assert kernels_of(device_swarm_kernels) == set(signatures)
+    kernels = {name: (getattr(device_swarm_kernels, name), types) for name, types in signatures.items()}
+    assert set(compiled(monkeypatch, capability, kernels)) == set(signatures)

@@ -3,34 +3,26 @@ by layer and particle by particle.
 """
 
 import dataclasses
-import importlib
-import inspect
-import pickle
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
+import simulated_tempered as made
+from compiled_card import FLAG, GENERATIONS, LONG, compiled, kernels_of, needs_compilers, of_type
 from scipy.special import ndtr, ndtri
-from simulated_card import run_simulated
+from simulated_card import found_simulated
+from simulated_weighing import scene_of
 
-HERE = Path(__file__).parent
-sys.path.append(str(HERE.parent / "likelihood"))
-import simulated_tempered as made  # noqa: E402
-from simulated_weighing import scene_of  # noqa: E402
-
-from studio.search.likelihood.edge_region_silhouette import (  # noqa: E402
+from studio.search.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
     EdgeRegionSilhouetteSettings,
 )
-from studio.search.trackers import device_tempered_kernels  # noqa: E402
-from studio.search.trackers.device_tempered_kernels import normal_at, share_below  # noqa: E402
-from studio.search.trackers.frame_prior import FramePrior  # noqa: E402
-from studio.search.trackers.settings import TemperedSettings  # noqa: E402
-from studio.search.trackers.tempered import (  # noqa: E402
+from studio.search.trackers import device_tempered_kernels
+from studio.search.trackers.device_tempered_kernels import normal_at, share_below
+from studio.search.trackers.frame_prior import FramePrior
+from studio.search.trackers.settings import TemperedSettings
+from studio.search.trackers.tempered import (
     BEFORE,
     BEFORE_ELIGIBLE,
     BEFORE_PRIOR,
@@ -42,15 +34,13 @@ from studio.search.trackers.tempered import (  # noqa: E402
     WHOLE,
     TemperedFilter,
 )
-from studio.search.trackers.tracker import FilterState, LayerRecord  # noqa: E402
+from studio.search.trackers.tracker import FilterState, LayerRecord
 
 
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What a process gives whose device is simulated."""
-    place = tmp_path_factory.mktemp("tempered") / "found.pickle"
-    run_simulated(HERE / "simulated_tempered.py", place)
-    return pickle.loads(place.read_bytes())
+    return found_simulated(Path(made.__file__), tmp_path_factory)
 
 
 def assert_alike(there: list[LayerRecord], here: list[LayerRecord]) -> None:
@@ -144,11 +134,17 @@ def test_runs_side_by_side_are_those_of_the_runs_alone(simulated: dict[str, Any]
     assert not np.array_equal(beside[0][0].poses, beside[1][0].poses)
 
 
-def test_a_parameter_without_room_keeps_its_value_and_stops_no_move(simulated: dict[str, Any]) -> None:
-    records = simulated["without room"]["records"]
-    for record in records:
+@pytest.mark.parametrize("name", made.WITHOUT_ROOM)
+def test_a_parameter_without_room_keeps_its_value_and_stops_no_move(
+    simulated: dict[str, Any], name: str
+) -> None:
+    """As near as a card has it; what goes on elsewhere has the value itself."""
+    found = simulated["without room"][name]
+    for record in found["records"]:
         np.testing.assert_array_equal(record.poses[:, 3], np.float32(0.1))
-    assert min(record.acceptance for record in records[1:]) > 0.1
+    np.testing.assert_array_equal(found["carried"].particles.poses[:, 3], 0.1)
+    if name == "tempered":
+        assert min(record.acceptance for record in found["records"][1:]) > 0.1
 
 
 def test_a_frame_is_weighed_by_the_devices_kernels(simulated: dict[str, Any]) -> None:
@@ -188,50 +184,32 @@ def test_what_is_kept_there(knobs: dict[str, Any], extra: dict[str, np.ndarray],
     assert TemperedFilter().fits_device(0, made.SPACE, TemperedSettings(**knobs), extra) == fits
 
 
-@pytest.mark.skipif(
-    sys.version_info >= (3, 12) or sys.platform != "linux",
-    reason="NVIDIA's compilers are locked for one Python",
-)
-@pytest.mark.parametrize("capability", [(8, 0), (9, 0)])
+@needs_compilers
+@pytest.mark.parametrize("capability", GENERATIONS)
 def test_every_kernel_compiles_for_a_card(
     monkeypatch: pytest.MonkeyPatch, capability: tuple[int, int]
 ) -> None:
-    """PTX for two generations of cards, made without one by NVIDIA's compilers, which `make env` installs."""
-    dispatching = importlib.import_module("numba.cuda.dispatcher")
-    device = SimpleNamespace(compute_capability=capability)
-    monkeypatch.setattr(dispatching, "get_current_device", lambda: device)
-    cuda = importlib.import_module("studio.foundations.numba_on_devices").cuda
-
-    def of(kind: str, dimensions: int = 1) -> numba.types.Array:
-        return numba.types.Array(numba.from_dtype(np.dtype(kind)), dimensions, "C")
-
-    f4, f8, u8, parents, moments = of("f4", 2), of("f8", 2), of("u8", 2), of("i4", 2), of("f8", 3)
-    logs, lots, numbers, place = of("f8"), of("u4"), of("i4"), of("i8")
-    whole, flag = numba.types.int64, numba.types.boolean
+    f4, f8, u8, parents = (of_type(kind, 2) for kind in ("f4", "f8", "u8", "i4"))
+    moments = of_type("f8", 3)
+    logs, lots, numbers, place = (of_type(kind) for kind in ("f8", "u4", "i4", "i8"))
     signatures = {
-        "share_centres": (f4, whole, logs, f8, f8, logs),
-        "draw_prior": (f4, whole, logs, f8, f8, f8, u8, whole, f4),
-        "find_densities": (f4, f4, whole, logs, f8, f8, whole, logs),
+        "share_centres": (f4, LONG, logs, f8, f8, logs),
+        "draw_prior": (f4, LONG, logs, f8, f8, f8, u8, LONG, f4),
+        "find_densities": (f4, f4, LONG, logs, f8, f8, LONG, logs),
         "take_moves": (
-            *(f4, f4, f8, logs, logs, logs, numbers, numbers, logs, f8, u8, whole),
+            *(f4, f4, f8, logs, logs, logs, numbers, numbers, logs, f8, u8, LONG),
             *(f4, f8, logs, numbers),
         ),
-        "adapt_steps": (numbers, numbers, whole, flag, logs, f8, f8, f8),
-        "climb": (f8, f8, whole, f8),
-        "draw_sample": (f4, f8, logs, logs, f8, u8, whole, flag, f4, logs, logs, parents, lots),
-        "find_weighted_correlations": (f4, logs, whole, moments, moments),
-        "rank_lots": (lots, logs, whole, numbers, numbers),
+        "adapt_steps": (numbers, numbers, LONG, FLAG, logs, f8, f8, f8),
+        "climb": (f8, f8, LONG, f8),
+        "draw_sample": (f4, f8, logs, logs, f8, u8, LONG, FLAG, f4, logs, logs, parents, lots),
+        "find_weighted_correlations": (f4, logs, LONG, moments, moments),
+        "rank_lots": (lots, logs, LONG, numbers, numbers),
         "propose_moves": (
-            *(f4, moments, moments, f8, logs, u8, place, numbers, numbers, whole),
+            *(f4, moments, moments, f8, logs, u8, place, numbers, numbers, LONG),
             *(f4, numbers, numbers, logs),
         ),
     }
-    own = inspect.getmembers(device_tempered_kernels, inspect.isfunction)
-    assert {name for name, one in own if one.__module__ == device_tempered_kernels.__name__} == set(
-        signatures
-    )
-    for name, types in signatures.items():
-        kernel = getattr(device_tempered_kernels, name)
-        ptx = cuda.compile_ptx(kernel, numba.types.void(*types), cc=capability)[0]
-        assert ".entry" in ptx
-        assert "call" not in ptx, f"every helper of {name} is compiled into it"
+    assert kernels_of(device_tempered_kernels) == set(signatures)
+    kernels = {name: (getattr(device_tempered_kernels, name), types) for name, types in signatures.items()}
+    assert set(compiled(monkeypatch, capability, kernels)) == set(signatures)

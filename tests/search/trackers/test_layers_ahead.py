@@ -1,7 +1,5 @@
 """Layers that a card is given before the records of the last are read: their order, and what stays as it was."""
 
-import pickle
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,15 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from simulated_card import run_simulated
+import simulated_ahead as made
+from simulated_card import found_simulated
 
-HERE = Path(__file__).parent
-sys.path.append(str(HERE.parent / "likelihood"))
-import simulated_ahead as made  # noqa: E402
-
-from studio.search.trackers import device_runs  # noqa: E402
-from studio.search.trackers.device_runs import DeviceRuns, Launched, LayersAhead, Moment  # noqa: E402
-from studio.search.trackers.random_numbers import RandomNumbers  # noqa: E402
+from studio.search.trackers import device_runs
+from studio.search.trackers.device_runs import DeviceRuns, Launched, LayersAhead, Moment
+from studio.search.trackers.random_numbers import RandomNumbers
 
 LAYERS = 4
 
@@ -173,9 +168,7 @@ def test_what_is_sent_is_what_it_was_however_late_it_is_copied(monkeypatch: pyte
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What a process gives whose device is simulated."""
-    place = tmp_path_factory.mktemp("ahead") / "found.pickle"
-    run_simulated(HERE / "simulated_ahead.py", place)
-    return pickle.loads(place.read_bytes())
+    return found_simulated(Path(made.__file__), tmp_path_factory)
 
 
 def test_what_is_sent_is_what_it_was_when_it_was_sent(simulated: dict[str, Any]) -> None:
