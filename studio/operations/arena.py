@@ -29,6 +29,7 @@ from studio.results.comparison import trials as kinds
 from studio.results.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by, plain
 from studio.results.comparison.trials import Outcome, TrialJob, measure_name
 from studio.results.inspection.reading import InspectedRun
+from studio.search.likelihood.edge_region import CPU, Device
 from studio.sessions.atomic_files import writing
 from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock
@@ -218,6 +219,9 @@ class RaceRequest:
         int, Field(ge=10, le=100_000_000, description="Poses that each racer may weigh of a problem.")
     ] = 10_000
     seeds: Annotated[int, Field(ge=1, le=1000, description="Number of seeds of each racer, from 0 on.")] = 5
+    device: Annotated[
+        Device, Field(description="What weighs poses, where the likelihood lets it be chosen.")
+    ] = CPU
     file: ProblemFile = ""
 
 
@@ -250,7 +254,7 @@ def race(
     named = tuple(
         str(Path(one).absolute()) if one.endswith(SUFFIX) else one for one in request.racers or RACERS
     )
-    wanted = planned(definitions, named, request.evaluations, range(request.seeds), place)
+    wanted = planned(definitions, named, request.evaluations, range(request.seeds), place, request.device)
     folder = Path(out).absolute() if out else Workspace().root / ARENA
     with writing("The race", folder):
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,5 +1,6 @@
 """The arena's verbs on a toy set: races are kept, go on where they were ended, and are drawn from their own numbers."""
 
+import importlib
 import json
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +14,7 @@ from toy_arena import JOINTS, PART, ToyArena, make_arena
 import studio
 from studio.operations.jobs.trials import run_jobs
 from studio.results.arena.profiles import running_time
+from studio.search.likelihood.edge_region import DEVICE_MODULE
 from studio.sessions.process_lock import ProcessLock
 
 FAST = ("random-search", "cma-es")
@@ -50,6 +52,20 @@ def race(arena: ToyArena, out: Path, racers: tuple[str, ...] = FAST, **more: obj
         "progress": False,
     }
     return studio.arena.race(racers=racers, **(given | more))
+
+
+def test_a_race_has_its_poses_weighed_by_the_device_that_is_asked_for(
+    arena: ToyArena, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here without a card: `gpu` is refused, `auto` weighs as the processor does, as trials of their own."""
+    monkeypatch.setattr(importlib.import_module(DEVICE_MODULE), "missing", lambda: "no card here")
+    here = race(arena, tmp_path, ("random-search",), seeds=1)
+    with pytest.raises(studio.StudioError, match="no card here"):
+        race(arena, tmp_path, ("random-search",), seeds=1, device="gpu")
+    auto = race(arena, tmp_path, ("random-search",), seeds=1, device="auto")
+    assert (here.kept, auto.kept) == (0, 0)
+    assert [one.gaps for one in auto.trials] == [one.gaps for one in here.trials]
+    assert race(arena, tmp_path, ("random-search",), seeds=1).kept == 2
 
 
 def test_problems_are_those_of_the_file_with_nothing_spent(arena: ToyArena) -> None:

@@ -37,6 +37,7 @@ from studio.results.inspection.reference import true_pose
 from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.run_behaviour import RunBehaviour
 from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.likelihood.edge_region import CPU, DEVICE_KNOB
 from studio.search.settings import RunSettings
 from studio.search.trackers.tracker import FilterState
 
@@ -102,6 +103,9 @@ def _maps(run: InspectedRun, number: int, settings: RunSettings) -> FrameMaps:
     source = source_of(run)
     evidence: FrameEvidence = source.evidence(number, settings)
     knobs = {one.name: getattr(settings.weighting, one.name) for one in knobs_of(settings.weighting)}
+    if DEVICE_KNOB in knobs:
+        # A problem goes to machines that have no card.
+        knobs[DEVICE_KNOB] = CPU
     return FrameMaps(
         number,
         run.body.name,

@@ -3,6 +3,7 @@
 import hashlib
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from studio.results.comparison import trials
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.kept_trials import code_digest
 from studio.results.comparison.trials import Outcome, kept_as
+from studio.search.likelihood.edge_region import CPU, DEVICE_KNOB
 
 DIGEST_LENGTH = 16
 CODE = ("results/arena",)
@@ -57,10 +59,12 @@ def planned(
     evaluations: int,
     seeds: Sequence[int],
     place: str,
+    device: str = CPU,
 ) -> tuple[trials.Trial, ...]:
     """A trial for each problem, racer and seed, problem by problem.
 
-    place : of the problems' file, "" for the bundled ones. Raises ArenaError, UnknownMemberError for a racer.
+    place : of the problems' file, "" for the bundled ones. device : what weighs poses. Raises ArenaError,
+    UnknownMemberError for a racer.
     """
     known = {name: (racer_named(name).name, _code_of(name)) for name in racers}
     names = [known[name][0] for name in racers]
@@ -81,12 +85,22 @@ def planned(
                 "code": known[name][1],
                 "evaluations": evaluations,
                 "seed": seed,
+                **({} if device == CPU else {DEVICE_KNOB: device}),
             },
         )
         for one in definitions
         for name in racers
         for seed in seeds
     )
+
+
+@lru_cache(maxsize=16)
+def weighed_by(definition: Definition, device: str) -> Definition:
+    """The problem with a device that weighs its poses, where its likelihood lets that be chosen."""
+    maps = definition.maps
+    if DEVICE_KNOB not in maps.knobs:
+        return definition
+    return replace(definition, maps=replace(maps, knobs={**maps.knobs, DEVICE_KNOB: device}))
 
 
 def _code_of(name: str) -> str:
@@ -107,6 +121,9 @@ def measure_race(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str,
     best = definition.best
     if best is None or best.hash != arguments["hash"]:
         raise ArenaError(f"Problem '{definition.name}' has changed meanwhile.", "Begin the race again.")
+    device = arguments.get(DEVICE_KNOB, CPU)
+    if device != CPU:
+        definition = weighed_by(definition, device)
     problem = Problem(definition, arguments["evaluations"])
     began = time.perf_counter()
     run_racer(racer_named(arguments["racer"]), problem, arguments["seed"])

@@ -64,6 +64,7 @@ Words = NDArray[np.uint32]
 CPU, AUTO, GPU = "cpu", "auto", "gpu"
 DEVICES = CPU, AUTO, GPU
 Device = Literal["cpu", "auto", "gpu"]
+DEVICE_KNOB = "device"
 DEVICE_MODULE = "studio.search.likelihood.device_weighing"
 NO_DEVICE_HINT = (
     "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'), which `studio doctor`"

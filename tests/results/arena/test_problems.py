@@ -10,12 +10,13 @@ import pytest
 from toy_arena import EVALUATIONS, JOINTS, PART, WHOLE, ToyArena
 
 from studio.foundations.errors import NotFoundError
-from studio.results.arena import problem_files
+from studio.results.arena import making, problem_files
 from studio.results.arena.making import frame_start, problems_of_run
 from studio.results.arena.problem import ArenaError, BudgetSpentError, Problem
 from studio.results.arena.problem_files import read_problems, write_problems
 from studio.results.inspection.likelihoods import evaluation_of
 from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.settings import changed_settings
 
 
 def drawn(problem: Problem, count: int = 50, seed: int = 1) -> np.ndarray:
@@ -26,6 +27,12 @@ def test_it_weighs_what_the_run_weighs(arena: ToyArena) -> None:
     problem, frame = arena.problem(), arena.run.frame(WHOLE)
     poses = drawn(problem)
     assert np.array_equal(problem.log_likelihood(poses), evaluation_of(frame).log_weights(poses))
+
+
+def test_a_problem_of_a_run_on_a_card_needs_none(arena: ToyArena) -> None:
+    on_card = changed_settings(arena.run.frame(WHOLE).settings, {"device": "gpu", "edge_weight": 2.5})
+    knobs = making._maps(arena.run, WHOLE, on_card).knobs
+    assert (knobs["device"], knobs["edge_weight"]) == ("cpu", 2.5)
 
 
 def test_a_part_is_searched_and_the_rest_held_as_the_run_reported_it(arena: ToyArena) -> None:
