@@ -29,7 +29,7 @@ from studio.foundations.package import assets_folder
 from studio.foundations.progress import no_progress
 from studio.operations.tracking import go_on, new_run
 from studio.runs.problem_source import ProblemSource
-from studio.search.likelihood.edge_region import CPU, DEVICE_MODULE, GPU
+from studio.search.likelihood.devices import CPU, DEVICE_MODULE, GPU
 from studio.search.settings import changed_settings, default_settings
 from studio.sessions.samples import install_sample
 from studio.sessions.workspace import Workspace

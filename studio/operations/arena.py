@@ -29,7 +29,7 @@ from studio.results.comparison import trials as kinds
 from studio.results.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by, plain
 from studio.results.comparison.trials import Outcome, TrialJob, measure_name
 from studio.results.inspection.reading import InspectedRun
-from studio.search.likelihood.edge_region import CPU, Device
+from studio.search.likelihood.devices import CPU, Device
 from studio.sessions.atomic_files import writing
 from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock

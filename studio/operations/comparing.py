@@ -48,7 +48,7 @@ from studio.results.comparison.trials import Outcome
 from studio.runs.behaviour_models import needs_model
 from studio.runs.new_run import own_knobs
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.likelihood.edge_region import CPU, Device
+from studio.search.likelihood.devices import CPU, Device
 from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.names import checked_name
 from studio.sessions.object_stores import below

@@ -32,7 +32,7 @@ from studio.runs.setup.subject_fitting import (
     keep_subject,
 )
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.likelihood.edge_region import CPU, Device
+from studio.search.likelihood.devices import CPU, Device
 from studio.sessions.atomic_files import check_writable
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import SUBJECT_NAME, Session

@@ -14,7 +14,7 @@ from toy_arena import JOINTS, PART, ToyArena, make_arena
 import studio
 from studio.operations.jobs.trials import run_jobs
 from studio.results.arena.profiles import running_time
-from studio.search.likelihood.edge_region import DEVICE_MODULE
+from studio.search.likelihood.devices import DEVICE_MODULE
 from studio.sessions.process_lock import ProcessLock
 
 FAST = ("random-search", "cma-es")

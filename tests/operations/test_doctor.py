@@ -18,7 +18,8 @@ from command_line import call
 from studio.cli import self_check as examination
 from studio.cli.self_check import Examined, doctor
 from studio.foundations.errors import RunError
-from studio.search.likelihood.edge_region import DEVICE_MODULE, EdgeRegionFrameLikelihood
+from studio.search.likelihood.devices import DEVICE_MODULE
+from studio.search.likelihood.edge_region import EdgeRegionFrameLikelihood
 from studio.sessions.workspace import Workspace
 
 Plant = Callable[[pytest.MonkeyPatch, Path], None]

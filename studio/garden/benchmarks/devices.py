@@ -13,7 +13,7 @@ from studio.foundations.errors import StudioError
 from studio.foundations.progress import Progress, no_progress
 from studio.garden.benchmarks.kernels import made_evidence, poses_around, ring_of_cameras
 from studio.runs.search_space import default_sigma, search_space
-from studio.search.likelihood.edge_region import CPU, GPU
+from studio.search.likelihood.devices import CPU, GPU
 from studio.search.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
     EdgeRegionSilhouetteSettings,

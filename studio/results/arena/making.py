@@ -37,7 +37,7 @@ from studio.results.inspection.reference import true_pose
 from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.run_behaviour import RunBehaviour
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.likelihood.edge_region import CPU, DEVICE_KNOB
+from studio.search.likelihood.devices import CPU, DEVICE_KNOB
 from studio.search.settings import RunSettings
 from studio.search.trackers.tracker import FilterState
 

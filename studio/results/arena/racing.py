@@ -18,7 +18,7 @@ from studio.results.comparison import trials
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.kept_trials import code_digest
 from studio.results.comparison.trials import Outcome, kept_as
-from studio.search.likelihood.edge_region import CPU, DEVICE_KNOB
+from studio.search.likelihood.devices import CPU, DEVICE_KNOB
 
 DIGEST_LENGTH = 16
 CODE = ("results/arena",)

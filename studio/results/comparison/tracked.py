@@ -33,7 +33,7 @@ from studio.runs.sides import known_silhouettes
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.behaviour.model_file import read_model
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.likelihood.edge_region import CPU
+from studio.search.likelihood.devices import CPU
 from studio.search.likelihood.hard_priors import HardPriors
 from studio.search.settings import RunSettings, changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS

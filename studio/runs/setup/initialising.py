@@ -35,7 +35,7 @@ from studio.runs.setup.person_facing import NETWORK_ODDS, facing_agreement
 from studio.runs.setup.session_settings import session_settings
 from studio.search.behaviour.model_file import read_model
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.likelihood.edge_region import CPU
+from studio.search.likelihood.devices import CPU
 from studio.search.likelihood.mesh_silhouettes import MeshSilhouettes
 from studio.search.settings import DEFAULT_TRACKER, RunSettings, changed_settings
 from studio.search.trackers.frame_refinement import Hypothesis, has_tail

@@ -11,11 +11,13 @@ Samples outside a picture are skipped and not counted, as in the benchmark; so i
 camera. A pose of which no camera sees anything has the worst score, 1 + 1.
 
 log w = -(a E_edge + b E_inside), a = b = 1 being the benchmark's: there is no other factor, since the
-annealed filter finds its own exponent β and Condensation its own likelihood scale.
+annealed filter finds its own exponent β and Condensation its own likelihood scale. `device` has a graphics card find
+it (`device_score_kernels`).
 """
 
+import importlib
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +29,19 @@ from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
 from studio.foundations.numba_in_threads import parallel_blocks
 from studio.search.likelihood.bodytrack_kernels import EDGE_STEP, MOST_ROWS, score_blocks
+from studio.search.likelihood.devices import DeviceFrameLikelihood, DevicePreparation, device_knob
 from studio.search.likelihood.edge_region_kernels import CHUNK
 from studio.search.likelihood.evidence_check import check_views
 from studio.search.likelihood.outline_kernels import LANES
 from studio.search.likelihood.picture_maps import Maps, joined_maps
-from studio.search.likelihood.problem import POOLED, BaseFrameLikelihood, Preparation, Shares
+from studio.search.likelihood.problem import POOLED, Shares
+
+if TYPE_CHECKING:
+    from studio.search.likelihood.device_weighing import ProblemOnDevice
 
 IntArray = NDArray[np.int64]
 
+SCORE_MODULE = "studio.search.likelihood.device_score"
 FULL = 255 * 255
 # The buffer holds at least one side, or one column of the grid, of any length; more samples than this of a kind in
 # one view come from a limb that fills many pictures, and are left out.
@@ -55,6 +62,7 @@ class BodytrackSettings:
     score_inside_weight: float = next_frame_knob(
         1.0, 0.0, 5.0, 0.05, help="Weight of E_inside; the benchmark's is 1."
     )
+    device: str = device_knob()
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +78,17 @@ class Score:
     inside_samples: int
 
 
-class BodytrackLikelihood(Preparation):
+class BodytrackLikelihood(DevicePreparation):
     """Makes the likelihood of any frame."""
+
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BodytrackSettings) -> None:
+        super().__init__(body, cameras, settings)
+        projector = self.projector
+        self.choose_device(
+            lambda _: importlib.import_module(SCORE_MODULE).ScoreDevice(
+                projector.program, projector.camera_table
+            )
+        )
 
     def problem(self, evidence: FrameEvidence) -> "BodytrackFrameLikelihood":
         """One frame as a function of poses; its edge maps are the benchmark's.
@@ -82,14 +99,24 @@ class BodytrackLikelihood(Preparation):
         return BodytrackFrameLikelihood(self, score_maps(evidence))
 
 
-class BodytrackFrameLikelihood(BaseFrameLikelihood):
+class BodytrackFrameLikelihood(DeviceFrameLikelihood):
     """One frame as a function of poses."""
 
     def __init__(self, likelihood: BodytrackLikelihood, maps: Maps) -> None:
-        self.likelihood, self.priors, self.maps = likelihood, likelihood.priors, maps
+        self.likelihood, self.maps = likelihood, maps
+        settings = likelihood.settings
+        self._factors = settings.score_edge_weight, settings.score_inside_weight, 0.0
+        super().__init__(likelihood, lambda device: device.frame(maps))
+
+    def on_device(self) -> "ProblemOnDevice | None":
+        """This frame's likelihood there, for a search that keeps its particles there; None where there is no device."""
+        return self.problem_there(self._factors, None, 1)
 
     def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
+        weights = self.device_weights(poses, self._factors)
+        if weights is not None:
+            return weights[1]
         edge, inside, _ = self.terms(np.asarray(poses, dtype=np.float64))
         settings = self.likelihood.settings
         return -(settings.score_edge_weight * edge + settings.score_inside_weight * inside)
@@ -104,7 +131,7 @@ class BodytrackFrameLikelihood(BaseFrameLikelihood):
         return Shares((POOLED,), ("edge", "inside"), values[:, None])
 
     def terms(self, poses: Array) -> tuple[Array, Array, IntArray]:
-        """E_edge (N,), E_inside (N,) and the samples counted of each (N, 2), of poses (N, D)."""
+        """E_edge (N,), E_inside (N,) and the samples counted of each (N, 2), of poses (N, D), by the processor."""
         outlines = self.likelihood.projector.blocks(poses)
         sums = np.zeros((len(outlines), LANES, 4), dtype=np.int64)
         blocks, capacity = len(outlines), self._capacity

@@ -166,6 +166,37 @@ def frames_kernel(joints: int) -> tuple[Any, int]:
     return cuda.jit(find_frames), together
 
 
+@cuda.jit(device=True, fastmath=FAST_HERE)
+def fill_corners(frames, limb_frame, limb_shape, view, pose, thread, count, corners):
+    """Fill a block's corners (4 L, 4) of a pose's limbs in a view: place, pixels, how it is seen, depth of the limb's
+    middle. A thread of the block does every ALL_ON-th of `count`.
+    """
+    at = thread
+    while at < count:
+        limb, corner = np.uint32(at >> TWO_ON), np.uint32(at & THREE_ON)
+        first = np.uint32(np.uint32(FRAME) * np.uint32(limb_frame[limb]))
+        frame = (
+            frames[pose, first], frames[pose, np.uint32(first + ONE_ON)], frames[pose, np.uint32(first + TWO_ON)],
+            frames[pose, np.uint32(first + THREE_ON)], frames[pose, np.uint32(first + np.uint32(4))],
+            frames[pose, np.uint32(first + np.uint32(5))], frames[pose, np.uint32(first + np.uint32(6))],
+            frames[pose, np.uint32(first + np.uint32(7))], frames[pose, np.uint32(first + np.uint32(8))],
+            frames[pose, np.uint32(first + np.uint32(9))], frames[pose, np.uint32(first + np.uint32(10))],
+            frames[pose, np.uint32(first + np.uint32(11))],
+        )  # fmt: skip
+        shape = (
+            limb_shape[limb, 0], limb_shape[limb, 1], limb_shape[limb, 2], limb_shape[limb, 3],
+            limb_shape[limb, 4],
+        )  # fmt: skip
+        start, axis, across = limb_axes(frame, shape, view)
+        along, radius = ZERO, shape[1]
+        if corner in (ONE_ON, TWO_ON):
+            along, radius = ONE, shape[2]
+        u, v, state = projected(view, start, axis, across, along, -radius if corner < TWO_ON else radius)
+        corners[at, 0], corners[at, 1], corners[at, 2] = u, v, state
+        corners[at, 3] = start[2] + HALF * axis[2]
+        at = np.uint32(at + ALL_ON)
+
+
 @functools.cache
 def terms_kernel(limbs: int, edge_chunks: int, region_chunks: int, areas: bool, occlusion: bool) -> Any:  # noqa: ANN401
     """The kernel `add_terms` for bodies of so many drawn limbs and so many times sixteen samples a line.
@@ -202,30 +233,7 @@ def terms_kernel(limbs: int, edge_chunks: int, region_chunks: int, areas: bool, 
         wide, high = np.uint32(places[problem, number, WIDTH]), np.uint32(places[problem, number, HEIGHT])
         view = view_of(cameras[number])
         across_all, down_all = ZERO, ZERO
-        at = thread
-        while at < corner_count:
-            limb, corner = np.uint32(at >> TWO_ON), np.uint32(at & THREE_ON)
-            first = np.uint32(np.uint32(FRAME) * np.uint32(limb_frame[limb]))
-            frame = (
-                frames[pose, first], frames[pose, np.uint32(first + ONE_ON)], frames[pose, np.uint32(first + TWO_ON)],
-                frames[pose, np.uint32(first + THREE_ON)], frames[pose, np.uint32(first + np.uint32(4))],
-                frames[pose, np.uint32(first + np.uint32(5))], frames[pose, np.uint32(first + np.uint32(6))],
-                frames[pose, np.uint32(first + np.uint32(7))], frames[pose, np.uint32(first + np.uint32(8))],
-                frames[pose, np.uint32(first + np.uint32(9))], frames[pose, np.uint32(first + np.uint32(10))],
-                frames[pose, np.uint32(first + np.uint32(11))],
-            )  # fmt: skip
-            shape = (
-                limb_shape[limb, 0], limb_shape[limb, 1], limb_shape[limb, 2], limb_shape[limb, 3],
-                limb_shape[limb, 4],
-            )  # fmt: skip
-            start, axis, across = limb_axes(frame, shape, view)
-            along, radius = ZERO, shape[1]
-            if corner in (ONE_ON, TWO_ON):
-                along, radius = ONE, shape[2]
-            u, v, state = projected(view, start, axis, across, along, -radius if corner < TWO_ON else radius)
-            corners[at, 0], corners[at, 1], corners[at, 2] = u, v, state
-            corners[at, 3] = start[2] + HALF * axis[2]
-            at = np.uint32(at + ALL_ON)
+        fill_corners(frames, limb_frame, limb_shape, view, pose, thread, corner_count, corners)
         cuda.syncthreads()
         counted = np.uint32(np.uint32(EDGE_LINES) * np.uint32(edge_limb.shape[0]))
         at = thread

@@ -17,18 +17,16 @@ any finite pose. Leaving such samples out instead, as the benchmark does, reward
 doing so is small: with all four Lee-walk pictures cut off below the hips the best root position moves by 20
 mm.
 
-**On a device.** `device` has the poses weighed on a graphics card (`device_weighing`; `device_weighing_kernels` says
-how equal the sums are). With `auto` a card that is not there, or that fails in compiling or launching a kernel, leaves
-the work to the processor, and a frame's notes say why, once.
+**On a device.** `device` has the poses weighed on a graphics card (`devices`; `device_weighing_kernels` says how equal
+the sums are).
 
 **Occlusion-aware edges.** A side that passes behind a nearer limb makes no edge in the picture. With the
 option on, such samples are left out of Eq. 14 and its N (of that view and pose) counts the others; if none is
 left, Σe = 1.
 """
 
-import importlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +34,10 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
-from studio.foundations.errors import BodyError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
 from studio.foundations.numba_in_threads import parallel_blocks
+from studio.search.likelihood.devices import DeviceFrameLikelihood, DevicePreparation, device_knob
 from studio.search.likelihood.edge_region_kernels import (
     CHUNK,
     EDGE_LINES,
@@ -51,25 +49,16 @@ from studio.search.likelihood.edge_region_kernels import (
 from studio.search.likelihood.evidence_check import check_views
 from studio.search.likelihood.outline_kernels import LANES
 from studio.search.likelihood.picture_maps import Maps, joined_maps
-from studio.search.likelihood.problem import BaseFrameLikelihood, Preparation, Shares
+from studio.search.likelihood.problem import Shares
 from studio.search.likelihood.silhouette_areas import Areas, Silhouettes
 from studio.search.likelihood.visible_edges import hidden_samples, limb_sides
 
 if TYPE_CHECKING:
-    from studio.search.likelihood.device_weighing import FrameOnDevice, ProblemOnDevice, WeighingDevice
+    from studio.search.likelihood.device_weighing import ProblemOnDevice
 
 IntArray = NDArray[np.int64]
 Words = NDArray[np.uint32]
 
-CPU, AUTO, GPU = "cpu", "auto", "gpu"
-DEVICES = CPU, AUTO, GPU
-Device = Literal["cpu", "auto", "gpu"]
-DEVICE_KNOB = "device"
-DEVICE_MODULE = "studio.search.likelihood.device_weighing"
-NO_DEVICE_HINT = (
-    "It needs an NVIDIA card, its driver and the extra `gpu` (pip install 'capture-studio[gpu]'), which `studio doctor`"
-    " tries; set device to cpu, or to auto, which takes a card only where one works."
-)
 # About half a millisecond of a four-camera frame.
 BLOCKS_A_THREAD = 24
 
@@ -107,12 +96,7 @@ class EdgeRegionSettings:
         help="Leave out edge samples that nearer limbs hide; takes two to three times as long.",
     )
 
-    device: str = next_frame_knob(
-        CPU,
-        choices=DEVICES,
-        help="What weighs poses: the processor, or an NVIDIA card with CUDA (extra `gpu`), which agrees but for a"
-        " sample in thousands; auto takes a card where there is one.",
-    )
+    device: str = device_knob()
 
     @property
     def edge_chunks(self) -> int:
@@ -125,22 +109,20 @@ class EdgeRegionSettings:
         return max(1, round(self.region_samples / (REGION_LINES * CHUNK)))
 
 
-class EdgeRegionLikelihood(Preparation):
-    """Makes that of any frame. device : what weighs poses in place of the processor. unsaid : why the processor weighs
-    them where a card was to be taken if there is one; the next frame's notes say it.
-    """
+class EdgeRegionLikelihood(DevicePreparation):
+    """Makes that of any frame."""
 
     def __init__(
         self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings, areas: bool = False
     ) -> None:
         """areas : whether a device finds the areas of silhouettes, too."""
         super().__init__(body, cameras, settings)
-        self.device: WeighingDevice | None = None
-        self.unsaid: tuple[str, ...] = ()
-        try:
-            self.device = device_for(settings, self, areas)
-        except StudioError as error:
-            self.unsaid = without_device(settings, error)
+        projector, chunks = self.projector, (settings.edge_chunks, settings.region_chunks)
+        self.choose_device(
+            lambda module: module.WeighingDevice(
+                projector.program, projector.camera_table, chunks, areas, settings.occlusion_aware
+            )
+        )
 
     @property
     def samples_per_evaluation(self) -> int:
@@ -160,23 +142,12 @@ class EdgeRegionLikelihood(Preparation):
         return EdgeRegionFrameLikelihood(self, weighting_maps(evidence), silhouettes)
 
 
-class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
+class EdgeRegionFrameLikelihood(DeviceFrameLikelihood):
     """One frame as a function of poses."""
 
     def __init__(self, likelihood: EdgeRegionLikelihood, maps: Maps, silhouettes: Silhouettes | None) -> None:
-        self.likelihood, self.priors, self.maps = likelihood, likelihood.priors, maps
-        self._notes, likelihood.unsaid = likelihood.unsaid, ()
-        device = likelihood.device
-        self._on_device: FrameOnDevice | None = None
-        try:
-            self._on_device = None if device is None else device.frame(maps, silhouettes)
-        except Exception as error:
-            self.give_up_device(error)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Why the processor weighs poses, in the first frame after a card was not there or failed."""
-        return self._notes
+        self.likelihood, self.maps = likelihood, maps
+        super().__init__(likelihood, lambda device: device.frame(maps, silhouettes))
 
     def log_likelihood(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
@@ -219,52 +190,12 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
 
         Raises BodyError for poses that are no finite (N, D), StudioError where a card that was asked for fails.
         """
-        return self._from_device("terms", poses, limbs)
-
-    def device_weights(
-        self, poses: Array, factors: tuple[float, float, float], limbs: NDArray[np.int64] | None = None
-    ) -> tuple[Array, Array] | None:
-        """(N,) fitness and (N,) log-weights of poses (N, D), as `device_terms`. factors : of the edge, the region and
-        the silhouette term.
-        """
-        return self._from_device("weights", poses, limbs, factors)
+        return self.from_device("terms", poses, limbs)
 
     def on_device(self) -> "ProblemOnDevice | None":
         """This frame's likelihood there, for a search that keeps its particles there; None where there is no device."""
         settings = self.likelihood.settings
         return self.problem_there((settings.edge_weight, settings.region_weight, 0.0), None, 1)
-
-    def problem_there(
-        self, factors: tuple[float, float, float], trunk: NDArray[np.int64] | None, ranked: int
-    ) -> "ProblemOnDevice | None":
-        """As `on_device`, with these fields."""
-        device, frame = self.likelihood.device, self._on_device
-        if device is None or frame is None:
-            return None
-        return importlib.import_module(DEVICE_MODULE).ProblemOnDevice(device, frame, factors, trunk, ranked)
-
-    def _from_device(self, method: str, poses: Array, *further: Any) -> Any:  # noqa: ANN401 - the method's own
-        device, frame = self.likelihood.device, self._on_device
-        if device is None or frame is None:
-            return None
-        shaped = self.likelihood.projector.shaped(poses)
-        try:
-            # Kernels are compiled by a process's first launch.
-            return getattr(device, method)(shaped, frame, *further)
-        except BodyError:
-            self.likelihood.projector.checked(poses)
-            raise
-        except Exception as error:
-            self.give_up_device(error)
-            return None
-
-    def give_up_device(self, error: Exception) -> None:
-        """The processor from now on, in this frame and the next. Raises StudioError where the card was asked for."""
-        refused = StudioError(f"The card failed: {in_a_line(error)}.", NO_DEVICE_HINT)
-        note = without_device(self.likelihood.settings, refused)
-        # Another frame's failure has said it already.
-        self._notes += note if self.likelihood.device is not None else ()
-        self.likelihood.device = self._on_device = None
 
     def _evaluated(
         self, outlines: NDArray[np.float32], hidden: NDArray[np.uint64], count: int
@@ -300,41 +231,6 @@ class EdgeRegionFrameLikelihood(BaseFrameLikelihood):
         samples = self.likelihood.settings.edge_chunks * CHUNK
         hidden = hidden_samples(outlines, limb_sides(limbs), samples)
         return hidden.reshape(blocks, views, limbs, EDGE_LINES, LANES)
-
-
-def device_for(settings: EdgeRegionSettings, likelihood: Preparation, areas: bool) -> "WeighingDevice | None":
-    """What the setting `device` asks for; None is the processor.
-
-    Raises StudioError where there is no device or it cannot be used.
-    """
-    if settings.device == CPU:
-        return None
-    projector = likelihood.projector
-    chunks = settings.edge_chunks, settings.region_chunks
-    try:
-        module = importlib.import_module(DEVICE_MODULE)
-        why = module.missing()
-        if not why:
-            return module.WeighingDevice(
-                projector.program, projector.camera_table, chunks, areas, settings.occlusion_aware
-            )
-    except StudioError:
-        raise
-    except Exception as error:
-        raise StudioError(f"A GPU cannot be used: {in_a_line(error)}.", NO_DEVICE_HINT) from error
-    raise StudioError(f"A GPU cannot be used: {why}.", NO_DEVICE_HINT)
-
-
-def without_device(settings: EdgeRegionSettings, error: StudioError) -> tuple[str, ...]:
-    """A note that says why the processor evaluates. Raises the error where the settings ask for the card."""
-    if settings.device == GPU:
-        raise error
-    return (f"The processor weighs the poses. {error.message}",)
-
-
-def in_a_line(error: Exception) -> str:
-    """An error of a library in one line, its kind where it says nothing else."""
-    return " ".join(str(error).split()).rstrip(" :.") or type(error).__name__
 
 
 def weighting_maps(evidence: FrameEvidence) -> Maps:

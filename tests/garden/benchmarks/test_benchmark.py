@@ -22,7 +22,8 @@ from studio.garden.benchmarks.kernels import (
     spans_contest,
 )
 from studio.garden.benchmarks.results_table import in_lines, rows_of
-from studio.search.likelihood.edge_region import DEVICE_MODULE, EdgeRegionLikelihood, EdgeRegionSettings
+from studio.search.likelihood.devices import DEVICE_MODULE
+from studio.search.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
 from studio.search.likelihood.silhouette_areas import FULL, silhouettes_of
 from studio.search.trackers.particle_swarm import ParticleSwarm
 from studio.search.trackers.tempered import TemperedFilter

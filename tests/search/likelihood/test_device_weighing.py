@@ -19,7 +19,8 @@ from studio.foundations.errors import BodyError, StudioError
 from studio.foundations.geometry.camera_table import camera_table, outward_limit
 from studio.operations.jobs.batch import track_to_end
 from studio.runs.new_run import prepare_run
-from studio.search.likelihood import device_weighing, edge_region
+from studio.search.likelihood import device_weighing, devices, edge_region
+from studio.search.likelihood.bodytrack import BodytrackLikelihood, BodytrackSettings
 from studio.search.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
 from studio.search.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
@@ -132,7 +133,7 @@ def three_settings(**knobs):
 @pytest.fixture
 def no_device(monkeypatch):
     """A machine without a card, whatever this one has."""
-    module = importlib.import_module(edge_region.DEVICE_MODULE)
+    module = importlib.import_module(devices.DEVICE_MODULE)
     monkeypatch.setattr(module, "missing", lambda: "no card here")
 
 
@@ -193,13 +194,37 @@ class Card:
         return np.zeros(shape, kind)
 
 
+def test_the_benchmarks_score_is_left_to_the_processor_by_a_card_that_is_not_there_or_fails(
+    monkeypatch, no_device
+):
+    body, cameras, evidence, poses = scene_of("human31")
+
+    def problem_of(device):
+        return BodytrackLikelihood(body, cameras, BodytrackSettings(device=device)).problem(evidence)
+
+    expected = problem_of("cpu").log_likelihood(poses)
+    with pytest.raises(StudioError, match="no card here"):
+        problem_of("gpu")
+    assert "no card here" in problem_of("auto").notes[0]
+    np.testing.assert_array_equal(problem_of("auto").log_likelihood(poses), expected)
+    device = importlib.import_module(devices.DEVICE_MODULE)
+    monkeypatch.setattr(device, "missing", lambda: "")
+    monkeypatch.setattr(device, "cuda", Card)
+    monkeypatch.setattr(device, "pose_kernels", lambda: broken("launch"))
+    failing = problem_of("auto")
+    assert failing.on_device() is not None
+    np.testing.assert_array_equal(failing.log_likelihood(poses), expected)
+    assert "cuLaunchKernel" in failing.notes[0]
+    assert failing.on_device() is None
+
+
 @pytest.mark.parametrize(
     ("fails", "why"),
     [("compilation", "row_stack"), ("launch", "cuLaunchKernel results in CUDA_ERROR_UNKNOWN")],
 )
 def test_a_card_that_fails_leaves_auto_to_the_processor_which_says_why_once(monkeypatch, fails, why):
     """There is a card; its kernels cannot be compiled, or the first launch fails."""
-    device = importlib.import_module(edge_region.DEVICE_MODULE)
+    device = importlib.import_module(devices.DEVICE_MODULE)
     monkeypatch.setattr(device, "missing", lambda: "")
     monkeypatch.setattr(device, "cuda", Card)
     monkeypatch.setattr(device, "pose_kernels", lambda: broken(fails))
@@ -346,7 +371,7 @@ def test_a_run_stores_why_it_does_without_a_card(no_device, tmp_path):
 
 def test_without_numbas_target_the_gpu_is_refused(monkeypatch):
     body, cameras = load_body("human31"), four_cameras()
-    monkeypatch.setattr(edge_region, "DEVICE_MODULE", "studio.search.likelihood.no_such_device")
+    monkeypatch.setattr(devices, "DEVICE_MODULE", "studio.search.likelihood.no_such_device")
     with pytest.raises(StudioError, match="No module named"):
         EdgeRegionLikelihood(body, cameras, settings(device="gpu"))
     assert EdgeRegionLikelihood(body, cameras, settings(device="auto")).device is None
@@ -354,7 +379,7 @@ def test_without_numbas_target_the_gpu_is_refused(monkeypatch):
 
 def test_a_pose_that_is_not_finite_is_named(monkeypatch):
     """By its number, as on the processor; nothing is given up."""
-    device = importlib.import_module(edge_region.DEVICE_MODULE)
+    device = importlib.import_module(devices.DEVICE_MODULE)
     monkeypatch.setattr(device, "missing", lambda: "")
     monkeypatch.setattr(device, "cuda", Card)
     body, cameras, evidence, poses = scene_of("human31")
@@ -367,7 +392,7 @@ def test_a_pose_that_is_not_finite_is_named(monkeypatch):
 
 
 def test_a_body_or_picture_that_is_too_large_is_refused(monkeypatch):
-    device = importlib.import_module(edge_region.DEVICE_MODULE)
+    device = importlib.import_module(devices.DEVICE_MODULE)
     monkeypatch.setattr(device, "missing", lambda: "")
     monkeypatch.setattr(device, "cuda", Card)
     body, cameras, evidence, _ = scene_of("human31")
