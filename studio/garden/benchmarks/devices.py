@@ -13,6 +13,7 @@ from studio.foundations.errors import StudioError
 from studio.foundations.progress import Progress, no_progress
 from studio.garden.benchmarks.kernels import made_evidence, poses_around, ring_of_cameras
 from studio.runs.search_space import default_sigma, search_space
+from studio.search.likelihood.bodytrack import BodytrackLikelihood, BodytrackSettings
 from studio.search.likelihood.devices import CPU, GPU
 from studio.search.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
@@ -47,10 +48,15 @@ def run_device_benchmark(
     report = progress or no_progress
     rng = np.random.default_rng(0)
     poses = poses_around(body, max(*sizes, COMPARED), rng)
-    evidence = made_evidence(body, cameras, rng)["proximity"]
+    made = made_evidence(body, cameras, rng)
+    evidence = made["proximity"]
     problem = there.problem(evidence)
     here = EdgeRegionSilhouetteLikelihood(body, cameras, EdgeRegionSilhouetteSettings(device=CPU))
     on_host = here.problem(evidence)
+    score, score_on_host = (
+        BodytrackLikelihood(body, cameras, BodytrackSettings(device=device)).problem(made["bodytrack"])
+        for device in (GPU, CPU)
+    )
     space = search_space(body, default_sigma(body, FRAMES_PER_SECOND))
     steps: dict[str, Callable[[], object]] = {
         "card": lambda: measures.card_limits(there.edge_region.samples_per_evaluation, repeats),
@@ -60,6 +66,8 @@ def run_device_benchmark(
         "called": lambda: measures.called_rates(problem, poses, sizes, repeats),
         "host": lambda: measures.called_rates(on_host, poses, sizes[:1], repeats),
         "agreement": lambda: measures.agreement(problem, on_host, poses[:COMPARED]),
+        "score_called": lambda: measures.called_rates(score, poses, sizes, repeats),
+        "score_agreement": lambda: measures.agreement(score, score_on_host, poses[:COMPARED]),
         "frame_ms": lambda: {
             str(count): measures.frame_time(problem, space, body.neutral, count, repeats)
             for count in particles

@@ -3,10 +3,13 @@
 With `auto` a card that is not there, or that fails in compiling or launching a kernel, leaves the work to the
 processor, and a frame's notes say why, once.
 
-Cards weigh poses of edges and region, with or without the silhouette's areas (`device_weighing`), and by the
-benchmark's score (`device_score`). The other likelihoods are the processor's: blobs are fitted to a hull that is carved
-and cut into voxels anew each frame, which takes longer than weighing by them; edges and silhouette follow the outline
-of all limbs, and the template colours in pictures, neither of which is what runs begin with.
+Cards weigh by edges and region, with or without the silhouette's areas (`device_weighing`), and by the benchmark's
+score (`device_score`). The other likelihoods are the processor's:
+
+- `blobs`: a pose costs its joints and a few products a blob, no picture is read. What takes time is carving the hull
+  and fitting blobs to it, once a search, from poses that the search expects; a card would wait for that.
+- `edge-silhouette`: samples lie along what can be seen of the body's outline, whose edges are cut by one another first.
+- `template`: for one experiment with one camera, whose areas are those of the third term.
 """
 
 import importlib

@@ -177,3 +177,5 @@ def test_a_cards_figures_are_rows_beside_their_limits(monkeypatch):
     assert rows["card: tempered of 10 000 evaluations, a frame"]["reached"] == 0.5
     assert rows["card: largest difference of a log-weight"]["reached"] == 1.0
     assert rows["card: three terms, 100 000 poses here"]["value"] > 0.0
+    assert rows["card: the benchmark's score, 100 000 poses here"]["value"] > 0.0
+    assert rows["card: largest difference of a benchmark's score"]["value"] == 0.0
