@@ -20,7 +20,6 @@ from studio.foundations.geometry.camera_table import camera_table, outward_limit
 from studio.operations.jobs.batch import track_to_end
 from studio.runs.new_run import prepare_run
 from studio.search.likelihood import device_weighing, devices, edge_region
-from studio.search.likelihood.bodytrack import BodytrackLikelihood, BodytrackSettings
 from studio.search.likelihood.edge_region import EdgeRegionLikelihood, EdgeRegionSettings
 from studio.search.likelihood.edge_region_silhouette import (
     EdgeRegionSilhouetteLikelihood,
@@ -192,30 +191,6 @@ class Card:
     @staticmethod
     def pinned_array(shape, kind):
         return np.zeros(shape, kind)
-
-
-def test_the_benchmarks_score_is_left_to_the_processor_by_a_card_that_is_not_there_or_fails(
-    monkeypatch, no_device
-):
-    body, cameras, evidence, poses = scene_of("human31")
-
-    def problem_of(device):
-        return BodytrackLikelihood(body, cameras, BodytrackSettings(device=device)).problem(evidence)
-
-    expected = problem_of("cpu").log_likelihood(poses)
-    with pytest.raises(StudioError, match="no card here"):
-        problem_of("gpu")
-    assert "no card here" in problem_of("auto").notes[0]
-    np.testing.assert_array_equal(problem_of("auto").log_likelihood(poses), expected)
-    device = importlib.import_module(devices.DEVICE_MODULE)
-    monkeypatch.setattr(device, "missing", lambda: "")
-    monkeypatch.setattr(device, "cuda", Card)
-    monkeypatch.setattr(device, "pose_kernels", lambda: broken("launch"))
-    failing = problem_of("auto")
-    assert failing.on_device() is not None
-    np.testing.assert_array_equal(failing.log_likelihood(poses), expected)
-    assert "cuLaunchKernel" in failing.notes[0]
-    assert failing.on_device() is None
 
 
 @pytest.mark.parametrize(
