@@ -500,9 +500,11 @@ def _longer_memory(kept: Kept) -> Recomputed:
         ]
         first, last = points[0], points[-1]
         span = last["low"] / first["high"], last["high"] / first["low"]
-        here = "reproduced" if span[1] < 1.0 else "not reproduced" if span[0] >= 1.0 / MARGIN else "undecided"
         number = f"as printed, {evidence}: memory {memories[-1]} over memory 1, limb direction"
         shown = _number(kept, number)
+        pairs = shown["low"], shown["high"]
+        apart, paired = _smaller(span), _smaller(pairs)
+        here = paired if apart == "undecided" else apart
         judged.append(Judged(kept["name"], number, here, shown["verdict"]))
         errors = [one["ours"] for one in points]
         rising, orders, rank = rank_correlation(errors)
@@ -511,8 +513,13 @@ def _longer_memory(kept: Kept) -> Recomputed:
             f"the studio shows {shown['ours']:g}. The ends of the two intervals over each other: {last['low']:g} / "
             f"{first['high']:g} = {span[0]:.3f} at least, {last['high']:g} / {first['low']:g} = {span[1]:.3f} at "
             "most. Each interval misses its mean in at most 5 of 100 cases, so that both hold in 90. "
-            f"**{here.capitalize()}**. (The studio pairs the seeds, which gives a narrower one: "
-            f"{_interval((shown['low'], shown['high']))}.)",
+            + (
+                f"That is too wide to tell. The studio pairs the seeds, which gives {_interval(pairs)}: "
+                f"**{here.capitalize()}**."
+                if apart == "undecided"
+                else f"**{here.capitalize()}**. (The studio pairs the seeds, which gives a narrower one: "
+                f"{_interval(pairs)}.)"
+            ),
             f"The shape: the error is smallest with a memory of {memories[errors.index(min(errors))]}. Between the "
             f"errors' order and the memories' Spearman's ρ = 1 - 6 Σd² / (n (n² - 1)) = {rank:.3f}, where the claim "
             f"has it negative. Of all {orders} orders of {len(errors)} errors {rising} rise as much or more "
@@ -530,6 +537,11 @@ def _longer_memory(kept: Kept) -> Recomputed:
         _steps(steps),
     )
     return _section("The shape of a curve: longer memories", "curve", kept, quote, body, judged)
+
+
+def _smaller(span: tuple[float, float]) -> str:
+    """The verdict on a ratio that is claimed to be below 1, by its interval."""
+    return "reproduced" if span[1] < 1.0 else "not reproduced" if span[0] >= 1.0 / MARGIN else "undecided"
 
 
 def rank_correlation(values: Sequence[float]) -> tuple[int, int, float]:
