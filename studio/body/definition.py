@@ -42,6 +42,11 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     scale_y = 1
     side = "left"                     # left, right or middle
     part = ""                         # optional: "trunk" or "head", where a likelihood treats these apart
+    stretch = [0.8, 1.25]             # optional, of a limb of changing length: its least and greatest length, as shares
+                                      # of `length`, which is a dimension that no other limb has. The pose vector gets
+                                      # "left_shin_stretch", mm beyond that length, 0 at rest; whatever joints and
+                                      # markers are moved by the dimension is moved along. At most twice the least
+    stretch_step = 30                 # optional: largest expected change, mm per second
 
     [[markers]]                       # named points, between which a subject's lengths are given
     name = "LKnee"
@@ -125,6 +130,8 @@ class LimbEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     scale_y: float | str = 1.0
     side: Literal["left", "right", "middle"] = "middle"
     part: Literal["trunk", "head", ""] = ""
+    stretch: tuple[float, float] | None = None
+    stretch_step: float | None = None
 
 
 class MarkerEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

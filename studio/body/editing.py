@@ -18,6 +18,7 @@ from studio.body.forward_kinematics import joint_frames
 from studio.body.mirroring import Mirror, name_twins
 from studio.body.model import BodyModel
 from studio.body.reader import parse_body
+from studio.body.stretching import stretch_name
 from studio.body.subject import LONGEST_MM
 from studio.body.writing import body_text, sized_definition, unit_of
 from studio.foundations.errors import BodyError
@@ -30,6 +31,7 @@ SAME_MM = 1e-6
 """Sizes and places within which a mirrored entry is left as it is written."""
 QUARTER = 90.0
 """Degrees."""
+SHARE_DIGITS = 9
 MARKER = re.compile(r"([^=]+)=([^,=]+),([^,]+),([^,]+),([^,]+)")
 
 
@@ -136,7 +138,8 @@ def _check_size(part: str, value: float, is_scale: bool) -> None:
 
 
 def _with_limits(definition: BodyDefinition, limits: Mapping[str, float], notes: list[str]) -> BodyDefinition:
-    known = {entry.name for entry in definition.parameters}
+    stretching = {stretch_name(limb): limb for limb in definition.limbs if limb.stretch is not None}
+    known = {entry.name for entry in definition.parameters} | set(stretching)
     changes: dict[str, dict[str, float]] = {}
     for name, value in limits.items():
         parameter, dot, key = name.rpartition(".")
@@ -151,7 +154,28 @@ def _with_limits(definition: BodyDefinition, limits: Mapping[str, float], notes:
         _limit(entry, changes[entry.name], notes) if entry.name in changes else entry
         for entry in definition.parameters
     )
-    return msgspec.structs.replace(definition, parameters=parameters)
+    sized = _values(definition)
+    limbs = tuple(
+        _stretch(limb, changes[name], sized)
+        if (name := stretch_name(limb)) in changes and name in stretching
+        else limb
+        for limb in definition.limbs
+    )
+    return msgspec.structs.replace(definition, parameters=parameters, limbs=limbs)
+
+
+def _stretch(limb: LimbEntry, changes: Mapping[str, float], sizes: Mapping[str, float]) -> LimbEntry:
+    """The limb with other bounds of its length, given as mm beyond it."""
+    if "neutral" in changes:
+        _fail(f"'{stretch_name(limb)}'", "is 0 at rest", f"Change the length of limb '{limb.name}' instead.")
+    length = sizes[split_sign(str(limb.length))[1]]
+    least, greatest = limb.stretch or (1.0, 1.0)
+    if "lower" in changes:
+        least = round(1.0 + changes["lower"] / length, SHARE_DIGITS)
+    if "upper" in changes:
+        greatest = round(1.0 + changes["upper"] / length, SHARE_DIGITS)
+    step = changes.get("max_step", limb.stretch_step)
+    return msgspec.structs.replace(limb, stretch=(least, greatest), stretch_step=step)
 
 
 def _limit(entry: ParameterEntry, changes: Mapping[str, float], notes: list[str]) -> ParameterEntry:
@@ -208,13 +232,14 @@ def _mirrored(body: BodyModel, side: str, notes: list[str]) -> BodyModel:
             dimensions[names[twin]] = _with_value(dimensions[names[twin]], dimensions[name].value)
     definition = msgspec.structs.replace(definition, dimensions=dimensions)
     definition = _mirrored_limbs(definition, side)
-    parameters = list(definition.parameters)
+    parameters = {entry.name: entry for entry in definition.parameters}
     twins: list[int] = mirror.twins.tolist()
     for at, twin in enumerate(twins):
-        own, sign = parameters[at], float(mirror.signs[at])
-        if side in own.limb and twin != at:
-            parameters[twin] = _mirrored_limits(own, parameters[twin], sign)
-    definition = msgspec.structs.replace(definition, parameters=tuple(parameters))
+        own, other, sign = body.parameters[at].name, body.parameters[twin].name, float(mirror.signs[at])
+        # Bounds of limbs' lengths are the limbs'.
+        if own in parameters and other in parameters and side in parameters[own].limb and twin != at:
+            parameters[other] = _mirrored_limits(parameters[own], parameters[other], sign)
+    definition = msgspec.structs.replace(definition, parameters=tuple(parameters.values()))
     whole = _check(definition, body.name)
     # Its sides are even now: so is the plane between them.
     changed = _mirrored_markers(whole, Mirror(whole), side, notes)
@@ -246,6 +271,8 @@ def _mirrored_limbs(definition: BodyDefinition, side: str) -> BodyDefinition:
                 # The twin's own way of writing it cannot follow: it gets the number.
                 number = math.copysign(wanted, present)
                 limbs[twin] = msgspec.structs.replace(limbs[twin], **{key: number})
+        own = limbs[at]
+        limbs[twin] = msgspec.structs.replace(limbs[twin], stretch=own.stretch, stretch_step=own.stretch_step)
     return msgspec.structs.replace(definition, limbs=tuple(limbs))
 
 

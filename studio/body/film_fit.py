@@ -308,7 +308,7 @@ def _placed(
     begin = strictly_inside(pose[free], lower, upper) / scale
     pull = 0.02 * mm
     rest = body.neutral[free] / scale
-    held = np.where(body.angles[free], pull, 0.0)
+    held = np.where(_returning(body)[free], pull, 0.0)
 
     def offsets(poses: Array) -> Array:
         return (marker_points(body, poses)[:, seen] - points[seen]).reshape(len(poses), -1)
@@ -325,6 +325,13 @@ def _placed(
         most=40,
         tolerance=1e-5,
     )
+
+
+def _returning(body: BodyModel) -> Mask:
+    """(D,) which parameters are drawn to their rest values: angles, and limbs' changes of length."""
+    returning = body.angles
+    returning[[limb.slide for limb in body.limbs if limb.slide >= 0]] = True
+    return returning
 
 
 def _limits(body: BodyModel, free: Indices) -> tuple[Array, Array]:
@@ -358,7 +365,7 @@ class _Problem:
         self.base = body
         self.lower, self.upper = _limits(body, tree.free)
         self.unit = np.where(body.angles[tree.free], 1.0, _mm_per_radian(body))
-        pulled = body.angles[tree.free] & ~tree.rooted
+        pulled = _returning(body)[tree.free] & ~tree.rooted
         self.pull = np.where(pulled, 1.0 / ANGLE_SPREAD, 0.0)
         self.rest = body.neutral[tree.free] / self.unit
         count, parameters = len(frames), len(tree.free)

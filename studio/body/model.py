@@ -74,7 +74,8 @@ class Limb:
     radius_start, radius_end : mm at z = 0 and z = length. scale_x, scale_y : of the cross-section along local
     x, y. side : "left", "right" or "middle" (colours). part : "trunk", "head" or "" (neither), for likelihoods
     that treat these apart. Limbs of zero length are kept here but are not counted or drawn: see
-    `BodyModel.drawn`.
+    `BodyModel.drawn`. slide : the entry of the pose vector that moves it, where it is the far part of a limb of
+    changing length, else -1.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Limb:
     scale_y: float
     side: str
     part: str = ""
+    slide: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,8 +234,19 @@ def ends_of(body: BodyModel, limbs: Sequence[Limb]) -> Mask:
     bones = [moving_joint(body, limb.joint) for limb in limbs]
     carrying = {above for limb in limbs for above in joints_above(body, limb.joint)}
     bearing = {above for bone in bones for above in joints_above(body, bone)}
+    # What a limb of changing length carries lies on joints of its own that its far part's slide moves along.
+    sliding = {
+        entry
+        for limb in limbs
+        for joint in joints_upwards(body, limb.joint)
+        for entry in body.joints[joint].parameters
+        if entry != limb.slide
+    }
     return np.array(
-        [limb.joint not in carrying and bone not in bearing for limb, bone in zip(limbs, bones, strict=True)],
+        [
+            limb.joint not in carrying and bone not in bearing and limb.slide not in sliding
+            for limb, bone in zip(limbs, bones, strict=True)
+        ],
         dtype=np.bool_,
     )
 

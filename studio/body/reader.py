@@ -14,6 +14,7 @@ import numpy as np
 from studio.body.definition import WORLD, BodyDefinition, JointEntry, ParameterEntry, StepEntry, split_sign
 from studio.body.meshes import mesh_of
 from studio.body.model import MOVE, TURN, BodyModel, Joint, Limb, LinkMesh, Marker, Parameter, Step
+from studio.body.stretching import MOST_STRETCH, far_name, stretch_name, with_slides
 from studio.foundations.errors import BodyError
 from studio.foundations.foreign_files import foreign_file, read_foreign_text
 from studio.foundations.typed_decoding import decode_toml, is_list
@@ -41,6 +42,7 @@ def check_definition(definition: BodyDefinition, file: str) -> None:
     check.limbs()
     check.markers()
     check.meshes()
+    check.stretching()
 
 
 class _Check:
@@ -230,6 +232,54 @@ class _Check:
                     f"mesh {number}", f"cannot be read: {problem}", "Make the file of the robot's again."
                 )
 
+    def stretching(self) -> None:
+        """Limbs of changing length, when all else is known to be right."""
+        body = self.definition
+        for entry in body.limbs:
+            if entry.stretch is None:
+                if entry.stretch_step is not None:
+                    self.fail(f"limb '{entry.name}'", "has stretch_step alone", "Give stretch as well.")
+                continue
+            where = f"limb '{entry.name}', stretch,"
+            self.bounds(where, *entry.stretch)
+            step = entry.stretch_step
+            if step is not None and not (math.isfinite(step) and step > 0.0):
+                cause = f"has stretch_step {step:g}"
+                self.fail(f"limb '{entry.name}'", cause, "Give the largest change, mm per second, above 0.")
+            name = split_sign(entry.length)[1] if isinstance(entry.length, str) else ""
+            alike = [one.name for one in body.limbs if one is not entry and one.length in (name, f"-{name}")]
+            if not name or alike:
+                cause = f"shares its length with '{alike[0]}'" if alike else "has a length that is a number"
+                remedy = (
+                    "Name a dimension of this limb alone as its length, and move what hangs on it by that."
+                )
+                self.fail(where, cause, remedy)
+            if body.dimensions[name].value == 0.0:
+                self.fail(where, "is of a limb without length", f"Give dimension '{name}' a length above 0.")
+        self.free_names()
+
+    def bounds(self, where: str, least: float, greatest: float) -> None:
+        said = f"goes from {least:g} to {greatest:g}"
+        if not (0.0 < least <= 1.0 <= greatest < math.inf and least < greatest):
+            remedy = "Give shares of the limb's length, the least up to 1, the greatest from 1, such as [0.8, 1.25]."
+            self.fail(where, said, remedy)
+        if greatest > MOST_STRETCH * least:
+            remedy = (
+                f"Give at most {MOST_STRETCH:g} times the least length, or make two limbs of it in a row."
+            )
+            self.fail(where, said, remedy)
+
+    def free_names(self) -> None:
+        """Fail where a name that stretching adds is taken."""
+        body = self.definition
+        whole = with_slides(body, {name: entry.value for name, entry in body.dimensions.items()})
+        for kind in ("parameters", "joints", "limbs"):
+            names = Counter(entry.name for entry in getattr(whole, kind))
+            for name, count in names.items():
+                if count > 1 or (kind == "parameters" and name in body.dimensions):
+                    cause = f"is taken, and a limb that stretches makes a {kind[:-1]} of this name"
+                    self.fail(f"'{name}'", cause, "Rename what has the name, or the limb.")
+
     def joint(self, where: str, name: str) -> None:
         names = [entry.name for entry in self.definition.joints]
         if name not in names:
@@ -266,6 +316,7 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
 
     definition : already checked (`check_definition`), so every name in it exists.
     """
+    written, definition = definition, with_slides(definition, dimensions)
     parameter_index = {entry.name: index for index, entry in enumerate(definition.parameters)}
     joint_index = {entry.name: index for index, entry in enumerate(definition.joints)}
 
@@ -288,6 +339,11 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
             return Step(kind, axis_index, -1, amount(entry.by))
         return Step(kind, axis_index, -1, entry.by if kind == MOVE else math.radians(entry.by))
 
+    slides = {
+        far_name(limb): parameter_index[stretch_name(limb)]
+        for limb in written.limbs
+        if limb.stretch is not None
+    }
     return BodyModel(
         name=name,
         title=definition.title,
@@ -311,6 +367,7 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
                 amount(entry.scale_y),
                 entry.side,
                 entry.part,
+                slides.get(entry.name, -1),
             )
             for entry in definition.limbs
         ),
@@ -319,7 +376,7 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
             for entry in definition.markers
         ),
         dimensions=dict(dimensions),
-        definition=definition,
+        definition=written,
         meshes=tuple(LinkMesh(joint_index[entry.joint], *mesh_of(entry)) for entry in definition.meshes),
     )
 

@@ -20,6 +20,7 @@ import numpy as np
 from studio.body.definition import BodyDefinition, split_sign
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel, ends_of
+from studio.body.stretching import written_limbs
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BodyError
 
@@ -147,7 +148,7 @@ def untaped_lengths(body: BodyModel) -> frozenset[str]:
         return frozenset()
     dimensions = body.definition.dimensions
     names = set[str]()
-    for limb, is_end in zip(body.definition.limbs, ends_of(body, body.limbs), strict=True):
+    for limb, is_end in zip(written_limbs(body.definition), ends_of(body, body.limbs), strict=True):
         entry = dimensions.get(_name(limb.length))
         if entry is not None and (is_end or (limb.part == "trunk" and entry.of_height is None)):
             names.add(_name(limb.length))

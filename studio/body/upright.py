@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
+from studio.body.stretching import written_limbs
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,8 @@ class LimbDrawing:
 
 def limb_drawings(body: BodyModel) -> list[LimbDrawing]:
     """The drawn limbs of a body as it stands upright."""
-    entries = {limb.name: limb for limb in body.definition.limbs} if body.definition else {}
+    written = written_limbs(body.definition) if body.definition else ()
+    entries = {limb.name: entry for limb, entry in zip(body.limbs, written, strict=bool(written))}
     drawings: list[LimbDrawing] = []
     for limb, (start, end) in zip(body.drawn, limb_ends(body, body.neutral)[0], strict=True):
         length = entries[limb.name].length if limb.name in entries else ""

@@ -10,6 +10,7 @@ from studio.body.definition import BodyDefinition, split_sign
 from studio.body.editing import SIZES
 from studio.body.mirroring import has_sides
 from studio.body.model import BodyModel
+from studio.body.stretching import with_slides
 from studio.body.upright import LimbDrawing, limb_drawings
 from studio.body.writing import body_text
 from studio.foundations.errors import BodyError, StudioError
@@ -195,12 +196,12 @@ def edited_detail(edit: EditedBody) -> BodyDetail:
 
 def _limbs(body: BodyModel, definition: BodyDefinition) -> list[LimbSizes]:
     limbs: list[LimbSizes] = []
-    for entry, limb in zip(definition.limbs, body.limbs, strict=True):
+    for entry in definition.limbs:
         sizes: dict[str, SizeView] = {}
         for key in SIZES:
             written = getattr(entry, key)
             name = split_sign(written)[1] if isinstance(written, str) else ""
-            sizes[key] = SizeView(abs(float(getattr(limb, key))), name)
+            sizes[key] = SizeView(abs(body.dimensions[name] if name else float(written)), name)
         limbs.append(LimbSizes(entry.name, entry.joint, entry.side, **sizes))
     return limbs
 
@@ -217,5 +218,7 @@ def _limits(body: BodyModel, definition: BodyDefinition) -> list[LimitView]:
             neutral=np.nan if isinstance(entry.neutral, tuple) else entry.neutral,
             max_step=entry.max_step,
         )
-        for entry, model in zip(definition.parameters, body.parameters, strict=True)
+        for entry, model in zip(
+            with_slides(definition, body.dimensions).parameters, body.parameters, strict=True
+        )
     ]

@@ -139,5 +139,9 @@ def _place(body: BodyModel, entries: tuple[PlaceEntry, ...]) -> tuple[int, Array
             return marker.joint, np.asarray(marker.offset, dtype=float)
         if entry.limb in limbs:
             limb = limbs[entry.limb]
+            far = limbs.get(f"{entry.limb} end")
+            if far is not None and far.slide >= 0 and entry.at > 0.0:
+                # Along a limb of changing length only its end is always on the far part.
+                limb = far
             return limb.joint, np.array([0.0, 0.0, entry.at * limb.length])
     return None

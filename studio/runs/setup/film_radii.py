@@ -15,6 +15,7 @@ from studio.body.definition import split_sign
 from studio.body.forward_kinematics import limb_frames
 from studio.body.mirroring import name_twins
 from studio.body.model import BodyModel
+from studio.body.stretching import with_slides
 from studio.evidence.distance_maps import distances_of
 from studio.foundations.arrays import Array, Bytes, Floats, Indices
 from studio.foundations.geometry.camera import Camera
@@ -86,7 +87,7 @@ def _view(body: BodyModel, pose: Array, camera: Camera, mask: Bytes) -> _View | 
 class _Radii:
     def __init__(self, body: BodyModel, *, symmetric: bool) -> None:
         assert body.definition is not None
-        entries = {limb.name: limb for limb in body.definition.limbs}
+        entries = {limb.name: limb for limb in with_slides(body.definition, body.dimensions).limbs}
         self.body = body
         ends = [
             tuple(getattr(entries[limb.name], key) for key in ("radius_start", "radius_end"))
