@@ -1,7 +1,8 @@
 """Footage of any body, moving through key poses in a room: a robot arm, a hand.
 
 The surface is the body's own cones, a robot's with flat ends like its links (`edge_mm`), a hand's with rounded ones, so
-lengths and joints are those of the body and the outline is not quite. The motion is smooth between keys (monotone
+lengths and joints are those of the body and the outline is not quite. A hand may have flesh of its own instead
+(`hand_flesh.py`), and other sizes than the session's body. The motion is smooth between keys (monotone
 cubics, an angle for itself), so the truth is exact in every parameter. A small body is rendered `magnify` times as
 large before cameras that are so much further off, and pictures, calibration and truth are those of its own size: rooms
 are made for people.
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from studio.body.catalogue import body_file_text, load_body
+from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.body.motion_files.trc import MarkerMotion
@@ -40,8 +42,9 @@ from studio.results.drawing_footage.flesh import (
     SKIN,
     START,
 )
+from studio.results.drawing_footage.hand_flesh import hand_tables
 from studio.results.drawing_footage.person_footage import write_footage
-from studio.results.drawing_footage.recipe_file import Key, Recipe
+from studio.results.drawing_footage.recipe_file import HAND, Key, Recipe
 from studio.results.drawing_footage.renderer import MOMENTS, SurfaceRenderer
 from studio.results.drawing_footage.rooms import room_called
 from studio.results.drawing_footage.wardrobes import dressed
@@ -55,9 +58,10 @@ TRUE_POSES = "true_poses.csv"
 
 
 def recipe_body(recipe: Recipe, folder: Path) -> BodyModel:
-    """The body of a recipe: of a file beside it, or by name. Raises BodyError."""
+    """The body of a recipe: of a file beside it, or by name, in the recipe's sizes. Raises BodyError."""
     beside = folder / recipe.body
-    return load_body(str(beside) if beside.is_file() else recipe.body)
+    body = load_body(str(beside) if beside.is_file() else recipe.body)
+    return with_dimensions(body, recipe.sizes) if recipe.sizes else body
 
 
 def key_poses(body: BodyModel, keys: Sequence[Key], spread: float, rng: np.random.Generator) -> Array:
@@ -132,7 +136,11 @@ def body_renderer(
     moments = MOMENTS if shutter > 0.0 else 1
     within = shutter * ((np.arange(moments) + 0.5) / moments - 0.5)
     times = (np.arange(frames)[:, None] + within) / recipe.fps
-    tables, labels = body_pieces(body, body_motion(recipe, body, times.ravel()), magnify, recipe.edge_mm)
+    poses = body_motion(recipe, body, times.ravel())
+    if recipe.flesh == HAND:
+        tables, labels = hand_tables(body, poses, magnify)
+    else:
+        tables, labels = body_pieces(body, poses, magnify, recipe.edge_mm)
     enlarged = tuple(replace(camera, translation=magnify * camera.translation) for camera in cameras)
     room = room_called(recipe.room)
     points = magnify * limb_ends(body, body_motion(recipe, body, times[:, moments // 2]))

@@ -25,6 +25,7 @@ from studio.results.drawing_footage.wardrobes import MATERIALS, WARDROBES
 RECIPES = Path(__file__).parent / "recipe_files"
 SUFFIX = ".toml"
 RECORDED, JOINED, KEYS = "recorded", "joined", "keys"
+HAND = "hand"
 LIKE, LONGEST_CHAIN = "like", 5
 
 
@@ -90,24 +91,25 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     motion : "walk", "run", "box", "handstand", "stand", "circuit" and others (`motions.py`); or "arm", which shows
     `body` itself, seen by one camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc,
-    .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it); or "joined", several `clips` of such motion one
-    after the other (`recorded_clips.py`); or "keys", which moves `body` (a name, or a body, URDF or MJCF file) through
-    `keys` in the room (`body_footage.py`; option spread_degrees: the largest random change of a key's angles), rendered
-    `magnify` times as large, its cones with flat ends whose edges are rounded by `edge_mm`, or by 0 with wholly rounded
-    ones. options : numbers of the motion. weighting : what runs of the session use by
-    default. An entry `like` in the file names another recipe, bundled or beside it, whose entries are the defaults of
-    this one.
+    .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it); or "joined", several `clips` of such motion
+    one after the other (`recorded_clips.py`); or "keys", which moves `body` (a name, or a body, URDF or MJCF file)
+    through `keys` in the room (`body_footage.py`; option spread_degrees: the largest random change of a key's angles),
+    rendered `magnify` times as large, its cones with flat ends whose edges are rounded by `edge_mm`, or by 0 with
+    wholly rounded ones; or, with `flesh` "hand", in the flesh of `hand_flesh.py` around the joints of body hand25.
+    sizes : dimensions of the moved body that differ from its file's, which the session does not tell. options :
+    numbers of the motion. weighting : what runs of the session use by default. An entry `like` in the file names
+    another recipe, bundled or beside it, whose entries are the defaults of this one.
 
     height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
-    the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered hands
-    and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : factor on the usual girths of
-    the flesh. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or "plain"
-    clothes, which hardly stand out in the "office". colours : replacements for some clothes, RGB 0...1. room :
-    "office", "furnished", "hall", "cell", or "drawn-" and a number for a randomly furnished room. damage : faults of
-    the footage. sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame
-    to frame at 60 Hz. beside : recipes (bundled or beside this one) whose people are in the room, too, over the same
-    frames; their motion, build and clothes count, nothing else. Files are relative to the recipe's folder, or in the
-    real data after "data:" (`real_data.py`).
+    the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered
+    hands and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : factor on the usual girths
+    of the flesh. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or
+    "plain" clothes, which hardly stand out in the "office". colours : replacements for some clothes, RGB 0...1. room :
+    "office", "furnished", "hall", "cell", "tabletop", or "drawn-" and a number for a randomly furnished room. damage :
+    faults of the footage. sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`,
+    from frame to frame at 60 Hz. beside : recipes (bundled or beside this one) whose people are in the room, too, over
+    the same frames; their motion, build and clothes count, nothing else. Files are relative to the recipe's folder, or
+    in the real data after "data:" (`real_data.py`).
     """
 
     title: str
@@ -118,6 +120,8 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     keys: tuple[Key, ...] = ()
     magnify: float = 1.0
     edge_mm: float = 0.0
+    flesh: str = ""
+    sizes: dict[str, float] = {}
     frames: int
     fps: float = 60.0
     seed: int = 1
@@ -238,6 +242,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
 CHOICES: Mapping[str, Iterable[str]] = {
     "wardrobe": WARDROBES,
     "cameras.rig": ("", *RIGS),
+    "flesh": ("", HAND),
     "include.background": ("clip", "picture", "none"),
 }
 
@@ -277,6 +282,8 @@ def _problem(recipe: Recipe) -> str:
         "keys are in the order of their moments": any(
             not later.at_s > sooner.at_s for sooner, later in itertools.pairwise(recipe.keys)
         ),
+        f"flesh and sizes belong to motion '{KEYS}'": recipe.motion != KEYS
+        and bool(recipe.flesh or recipe.sizes),
         "shape, sigma and proportions belong to a person, not to motion 'keys'": recipe.motion == KEYS
         and bool(recipe.shape or recipe.sigma or recipe.proportions != Proportions()),
         f"motion '{JOINED}' and [[clips]] belong together": (recipe.motion == JOINED) != bool(recipe.clips),

@@ -146,11 +146,31 @@ CELL = (
     Block((1700, 900, 220), (220, 260, 220), (0.55, 0.16, 0.12), GRAIN, (0.48, 0.14, 0.10), 0.5),
 )
 
+# A table top of the colour of skin before a wall of nearly that colour: what stands on it is hardly told by its colour.
+
+TABLE_LIGHTS = np.array([[700.0, -900.0, 2840.0], [250.0, 0.0, 0.0], [0.46, 0.445, 0.42], [0.56, 0.57, 0.59]])
+
+TABLETOP = (
+    Block((0, 0, 3), (2895, 2595, 3), (0.70, 0.45, 0.345), GRAIN, (0.62, 0.39, 0.295)),
+    *(
+        Block(centre, half, (0.72, 0.50, 0.40), GRAIN, (0.66, 0.45, 0.355))
+        for centre, half in (
+            ((2890, 0, 1450), (10, 2590, 1450)),
+            ((-2890, 0, 1450), (10, 2590, 1450)),
+            ((0, 2590, 1450), (2880, 10, 1450)),
+            ((0, -2590, 1450), (2880, 10, 1450)),
+        )
+    ),
+    Block((1500, 1300, 60), (420, 280, 60), (0.55, 0.40, 0.32), CHECKS, (0.66, 0.50, 0.40), 0.4),
+    Block((-1700, -1200, 45), (300, 420, 45), (0.72, 0.50, 0.40), GRAIN, (0.58, 0.36, 0.28), 0.9),
+)
+
 ROOMS = {
     "furnished": Room((2900.0, 2600.0), 2900.0, FURNITURE, LIGHTS),
     "office": Room((2900.0, 2600.0), 2900.0, OFFICE, OFFICE_LIGHTS),
     "hall": Room((4300.0, 4300.0), 3400.0, HALL, HALL_LIGHTS),
     "cell": Room((2800.0, 2800.0), 3200.0, CELL, CELL_LIGHTS),
+    "tabletop": Room((2900.0, 2600.0), 2900.0, TABLETOP, TABLE_LIGHTS),
 }
 
 # Randomly furnished rooms.
