@@ -10,6 +10,7 @@ from tracked_runs import finish
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import marker_points
 from studio.body.reader import parse_body
+from studio.foundations.arrays import Array
 from studio.runs.new_run import prepare_run
 
 WORM = """
@@ -56,7 +57,7 @@ def test_a_limb_that_grows_is_followed(tmp_path: Path) -> None:
     session = write_session(tmp_path / "worm", stiff, turns, CAMERAS, masks=True)
     (session.path / "bodies").mkdir()
     (session.path / "bodies" / "worm.toml").write_text(WORM)
-    truth = []
+    truth: list[Array] = []
     for frame, length in enumerate(LENGTHS):
         drawn = with_dimensions(stiff, {"front_length": length})
         truth.append(marker_points(drawn, turns[frame])[0])
