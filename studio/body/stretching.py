@@ -7,6 +7,7 @@ limb. Whatever is moved by the limb's length (joints' steps, markers) is moved b
 """
 
 from collections.abc import Mapping
+from typing import Literal
 
 import msgspec
 
@@ -23,6 +24,7 @@ from studio.body.definition import (
 
 MOST_STRETCH = 2.0
 """Greatest length as a multiple of the least: two cones that fit into the shortest limb reach along the longest."""
+AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")
 BOUND_TO_BOUND_S = 0.25
 """Seconds from the least to the greatest length, where the body says no largest movement."""
 
@@ -121,7 +123,7 @@ class _Slides:
         """The marker, on a slide of its own where it lies by the length of a limb that stretches."""
         steps = tuple(
             slide
-            for axis, value in zip("xyz", marker.at, strict=True)
+            for axis, value in zip(AXES, marker.at, strict=True)
             for slide in self.slide(StepEntry(value, move=axis))
         )
         if not steps:

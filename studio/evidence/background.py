@@ -435,7 +435,7 @@ def shadow_brightness(
     mean: NDArray[np.uint8 | np.float32],
     gain: NDArray[np.float32],
     size: int,
-) -> NDArray[np.float32]:
+) -> Floats:
     """(h, w) brightness of the shadow's pixels in each cell of `size` pixels a side, as a share of the background's; 0
     without any. shadow : (H, W) above 0, inside `place`. picture, mean, gain : as in `differing_pixels`.
     """
@@ -449,4 +449,7 @@ def shadow_brightness(
                     background = gain[c] * np.float32(mean[y, x, c])
                     dots[y // size, x // size] += np.float32(picture[y, x, c]) * background
                     norms[y // size, x // size] += background * background
-    return dots / np.maximum(norms, np.float32(1.0))
+    for row in range(rows):
+        for column in range(columns):
+            dots[row, column] /= max(norms[row, column], np.float32(1.0))
+    return dots

@@ -167,10 +167,12 @@ class FloorShadows:
         if scene is None:
             return chosen
         bright = np.concatenate([cells.brightness.ravel() for cells in seen])
-        own = np.concatenate([cells.brightness.ravel()[at] for cells, at in zip(seen, like, strict=True)])
+        each: Floats = np.concatenate(
+            [cells.brightness.ravel()[at] for cells, at in zip(seen, like, strict=True)]
+        )
 
         def shadows_at(height: float) -> NDArray[np.bool_]:
-            return on_floor(everything, bright, maps, self._views, owners, rays, own, tolerance, height)
+            return on_floor(everything, bright, maps, self._views, owners, rays, each, tolerance, height)
 
         explained = shadows_at(0.0)
         if scene[0, 2] > 0.0:

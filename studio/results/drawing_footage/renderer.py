@@ -144,8 +144,7 @@ class Renderer:
     def _shaded(self, view: _View, shadow: tuple[Floats, Floats]) -> Floats:
         """(H, W, 3) light of the room in a shadow."""
         key, ambient = (_at_places(grid, view.shadow_place) for grid in shadow)
-        light: Floats = view.key * key[..., None] + view.ambient * ambient[..., None]
-        return light
+        return np.asarray(view.key * key[..., None] + view.ambient * ambient[..., None], np.float32)
 
     def _person(self, view: _View, table: Array, rows: slice, columns: slice) -> tuple[Floats, Floats]:
         """Light (h, w, 3) and coverage (h, w) of the person at one moment inside a window."""

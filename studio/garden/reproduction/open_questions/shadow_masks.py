@@ -103,11 +103,11 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         for name, knobs in CHOICES.items():
             settings = dataclasses.replace(EvidenceSettings(), **knobs)
             seen = [background.foreground(picture, settings) for picture, _, _, background in views]
-            masks = [one.mask for one in seen]
+            masks: list[Bytes] = [one.mask for one in seen]
             if settings.mask_shadow_test and settings.mask_shadow_floor:
                 cells = [cells_of(*one) for one in seen]
                 masks = [
-                    with_cells(*one, chosen, own.size)
+                    with_cells(one.mask, one.shadow, chosen, own.size)
                     for one, chosen, own in zip(
                         seen, tells.unexplained(cells, settings.mask_shadow_alike), cells, strict=True
                     )
