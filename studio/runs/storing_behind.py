@@ -9,10 +9,12 @@ MOST_WAITING = 60
 
 
 class StoringBehind:
-    """Stores results in order in another thread. executor : of one thread; None: at once. Not thread-safe."""
+    """Stores results in order in another thread. executor : of one thread; None: at once. most : results that may
+    wait. Not thread-safe.
+    """
 
-    def __init__(self, executor: Executor | None) -> None:
-        self._executor = executor
+    def __init__(self, executor: Executor | None, most: int = MOST_WAITING) -> None:
+        self._executor, self._most = executor, most
         self._waiting: deque[Future[None]] = deque()
         self._failed: BaseException | None = None
 
@@ -21,7 +23,7 @@ class StoringBehind:
         if self._executor is None:
             action()
             return
-        while self._waiting and (self._waiting[0].done() or len(self._waiting) >= MOST_WAITING):
+        while self._waiting and (self._waiting[0].done() or len(self._waiting) >= self._most):
             self._next_done()
         self._waiting.append(self._executor.submit(self._done_unless_failed, action))
 

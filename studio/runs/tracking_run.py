@@ -9,7 +9,7 @@ an unfinished frame are applied again at the same layers.
 import contextlib
 import dataclasses
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -26,9 +26,10 @@ from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
 from studio.runs.run_watch import FrameSource, RunWatch
-from studio.runs.storing_behind import StoringBehind
+from studio.runs.storing_behind import MOST_WAITING, StoringBehind
 from studio.search.likelihood.problem import BaseFrameLikelihood
 from studio.search.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
+from studio.search.trackers import frame_loop
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_loop import FrameSearch, SearchState, held_over
 from studio.search.trackers.frame_refinement import FrameRefiner, space_after
@@ -63,16 +64,34 @@ class Stepped:
     searches: int = 1
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class LayerAtHand:
+    """What a run's next layer is done with. is_new : whether the settings are used for the first time."""
+
+    search: FrameSearch
+    problem: FrameLikelihood
+    version: int
+    settings: RunSettings
+    is_new: bool
+
+
 class TrackingRun:
     """Tracks a stored run. A second one for the same run raises RunError. Close it when done.
 
     storing : an executor of one thread, which stores each frame while the next one is searched; None: at once.
+    waiting : how many frames may wait for it.
     """
 
-    def __init__(self, run: StoredRun, problems: Problems, storing: Executor | None = None) -> None:
+    def __init__(
+        self,
+        run: StoredRun,
+        problems: Problems,
+        storing: Executor | None = None,
+        waiting: int = MOST_WAITING,
+    ) -> None:
         self.run, self.record, self.problems = run, run.record, problems
         self.tracker = TRACKERS[self.record.tracker]
-        self._behind, self._astray = StoringBehind(storing), False
+        self._behind, self._astray = StoringBehind(storing, waiting), False
         self._reader = ResultsReader(run.folder, self._wait_for_disk)
         self._behaviour = RunBehaviour(run, self._reader)
         self._watch = RunWatch(
@@ -217,24 +236,30 @@ class TrackingRun:
     @property
     def layers_done(self) -> int:
         """Layers done of the frame at hand; 0 between frames."""
-        return self._search.state.layers_done if self._search else 0
+        return self._search.layers_done if self._search else 0
 
     def step_layer(self) -> Stepped:
         """Do one layer of the next frame; after its last layer the frame is stored. Raises RunError when finished,
         SessionError if this frame or one before could not be stored: then the run continues from the stored frames.
         """
+        return step_together((self,))[0]
+
+    def layer_at_hand(self) -> LayerAtHand:
+        """The next layer, which is to be done and given to `take_layer`."""
         if self._astray:
             self._load_again()
         if self.finished:
             raise RunError(f"Run '{self.run.name}' has no frame left.", "Start a new run.")
-        began = time.perf_counter()
         frame = self.next_frame
         version, settings, is_new = self._settings_for(frame, self.layers_done)
         search = self._search or self._new_search(frame)
         with span("wait for the frame", frame):
             problem = self.problems.problem(frame, self._held_in(frame, settings))
-        with span("search", frame):
-            record = search.step(problem, version, settings.tracker)
+        return LayerAtHand(search, problem, version, settings, is_new)
+
+    def take_layer(self, done: LayerAtHand, record: LayerRecord, seconds: float) -> Stepped:
+        """Go on after a layer. seconds : that it took."""
+        began, search, settings = time.perf_counter() - seconds, done.search, done.settings
         self._search, self._saved, self._astray = search, False, search.finished
         self._layers.append(record)
         result = self.result_of(search, settings, self._layers) if search.finished else None
@@ -247,7 +272,7 @@ class TrackingRun:
             self._pace.add(self._spent)
             self._seconds, self._frames = self._seconds + sum(self._spent), self._frames + 1
             self._spent = []
-        return Stepped(record, result, settings if is_new else None, search.layer_count, search.repeats)
+        return Stepped(record, result, settings if done.is_new else None, search.layer_count, search.repeats)
 
     def result_of(
         self, search: FrameSearch, settings: RunSettings, layers: Sequence[LayerRecord]
@@ -436,3 +461,29 @@ class TrackingRun:
             self._writer.write_settings(version, result.frame, 0, values(settings))
             self._writer.write_frame(result, layers, settings.recording.record_particles)
         self._load_again()
+
+
+def step_together(runs: Sequence[TrackingRun]) -> list[Stepped]:
+    """Do the next layer of each of some runs as `TrackingRun.step_layer`; those of one frame's likelihood side by side
+    where a card can do it. Each has the results that it has alone.
+    """
+    began = time.perf_counter()
+    at_hand = [run.layer_at_hand() for run in runs]
+    seconds = (time.perf_counter() - began) / len(runs)
+    alike = dict[Hashable, list[int]]()
+    for place, one in enumerate(at_hand):
+        key = id(one.problem), one.search.in_common(one.version, one.settings.tracker)
+        alike.setdefault(key, []).append(place)
+    stepped = dict[int, Stepped]()
+    for places in alike.values():
+        together, began = [at_hand[place] for place in places], time.perf_counter()
+        with span("search", together[0].search.frame):
+            records = frame_loop.step_together(
+                [one.search for one in together],
+                together[0].problem,
+                [(one.version, one.settings.tracker) for one in together],
+            )
+        share = seconds + (time.perf_counter() - began) / len(places)
+        for place, one, record in zip(places, together, records, strict=True):
+            stepped[place] = runs[place].take_layer(one, record, share)
+    return [stepped[place] for place in range(len(runs))]

@@ -4,22 +4,35 @@ import json
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TypeVar
+
+import numpy as np
 
 from studio.foundations.errors import RunError, StudioError, WorkCancelledError
 from studio.foundations.progress import Progress
 from studio.operations.jobs.cluster import chosen_executor
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.jobs.process_executor import cores
-from studio.operations.jobs.swept_runs import measure_run
+from studio.operations.jobs.swept_runs import measure_run, measure_runs
 from studio.operations.jobs.trials import TrialResult, run_jobs
 from studio.results.comparison.kept_comparison import KeptComparison, trial_key
 from studio.results.comparison.kept_trials import KeptOutcome, measured_by, plain
 from studio.results.comparison.plan import Comparison, Plan, conclude, trials
 from studio.results.comparison.sweep import Sweep, conclude_sweep, run_name, sweep_trials
-from studio.results.comparison.tracked import TrackingTrial, measure_seeds, measure_tracking, seeds_at_once
+from studio.results.comparison.tracked import (
+    TrackingTrial,
+    measure_seeds,
+    measure_tracking,
+    runs_at_once,
+    seeds_at_once,
+)
 from studio.results.comparison.trials import Outcome, Trial, TrialJob
+from studio.runs.search_space import search_space
+from studio.runs.setup.session_settings import session_settings
+from studio.search.likelihood.devices import is_missing
+from studio.search.settings import RunSettings
+from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.manifest import now
 from studio.sessions.object_stores import above
 from studio.sessions.session import Session
@@ -147,7 +160,7 @@ def _measure(
     work = _Work.of(kept.plan(session))
     outcomes = _outcomes(kept, work)
     missing = [_job(kept, work, key) for key in work.trials if key not in outcomes]
-    groups = {group[0].key: group for group in _side_by_side(missing, processes or cores())}
+    groups = {group[0].key: group for group in _side_by_side(session, missing, processes or cores())}
     report("", len(outcomes), len(work.trials))
 
     def on_result(first: TrialJob, result: TrialResult) -> None:
@@ -169,19 +182,52 @@ def _measure(
     return work.plan, [outcomes[key] for key in work.trials]
 
 
-def _side_by_side(jobs: Sequence[TrialJob], processes: int) -> list[list[TrialJob]]:
-    """The jobs in groups: those of tracking trials that differ by seed alone and that a card searches side by side."""
+def _side_by_side(session: Session, jobs: Sequence[TrialJob], processes: int) -> list[list[TrialJob]]:
+    """The jobs in groups that a card searches side by side: tracking trials that differ by seed alone, and runs of a
+    sweep that differ by seed and by what leaves their likelihood and the search's shared knobs as they are.
+    """
     alike = dict[str, list[TrialJob]]()
     for job in jobs:
-        alike.setdefault(json.dumps({**job.arguments, "seed": None}, sort_keys=True), []).append(job)
+        alike.setdefault(_in_common(session, job), []).append(job)
     groups = list[list[TrialJob]]()
-    for seeds in alike.values():
-        most = 1
-        if seeds[0].measure is measure_tracking:
-            most = seeds_at_once(TrackingTrial.of_plain(seeds[0].arguments), len(seeds), processes)
-        groups += [seeds[first : first + most] for first in range(0, len(seeds), most)]
+    for together in alike.values():
+        first = together[0]
+        if first.measure is measure_run:
+            most = _runs_at_once(session, first, len(together), processes)
+        else:
+            most = seeds_at_once(TrackingTrial.of_plain(first.arguments), len(together), processes)
+        groups += [together[at : at + most] for at in range(0, len(together), most)]
     places = {job.key: place for place, job in enumerate(jobs)}
     return sorted(groups, key=lambda group: places[group[0].key])
+
+
+def _in_common(session: Session, job: TrialJob) -> str:
+    known: dict[str, object] = {**job.arguments, "seed": None}
+    if job.measure is measure_run:
+        settings = _settings(session, job)
+        shared = TRACKERS[settings.tracker_name].shared_knobs(settings.tracker)
+        known |= {
+            "run": None,
+            "note": None,
+            "changes": [shared, asdict(settings.weighting), asdict(settings.evidence)],
+        }
+    return json.dumps(known, sort_keys=True)
+
+
+def _runs_at_once(session: Session, job: TrialJob, runs: int, processes: int) -> int:
+    """How many of a sweep's runs are tracked side by side; 1 where the processor would search them in turn."""
+    settings, body = _settings(session, job), session.body(job.arguments["body"] or None)
+    space = search_space(body, np.zeros(len(body.parameters)))
+    fits = TRACKERS[settings.tracker_name].fits_device(0, space, settings.tracker, {})
+    if not fits or job.arguments.get("behaviour") or is_missing(settings.weighting):
+        return 1
+    return runs_at_once(settings, runs, processes)
+
+
+def _settings(session: Session, job: TrialJob) -> RunSettings:
+    """Those of a sweep's run."""
+    given = job.arguments
+    return session_settings(session, given["tracker"], given["weighting"], given["changes"])
 
 
 def _as_one(group: Sequence[TrialJob]) -> TrialJob:
@@ -191,7 +237,8 @@ def _as_one(group: Sequence[TrialJob]) -> TrialJob:
         return first
     arguments = {"trials": [job.arguments for job in group]}
     label = f"{first.label} and {len(group) - 1} more"
-    return replace(first, label=label, arguments=arguments, measure=measure_seeds)
+    measure = measure_runs if first.measure is measure_run else measure_seeds
+    return replace(first, label=label, arguments=arguments, measure=measure)
 
 
 def _job(kept: KeptComparison, work: _Work, key: str) -> TrialJob:

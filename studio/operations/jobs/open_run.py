@@ -20,6 +20,7 @@ from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.run_footage import footage_of
 from studio.runs.sides import correct_clip, in_words
+from studio.runs.storing_behind import MOST_WAITING
 from studio.runs.tracking_run import Stepped, TrackingRun
 from studio.search.settings import RunSettings, all_knobs, changed_settings, values
 from studio.sessions.run_log import append_to_log
@@ -87,13 +88,19 @@ class OpenRun:
 
     makes_ahead = True
 
-    def __init__(self, session_folder: str, run_folder: str) -> None:
+    def __init__(
+        self, session_folder: str, run_folder: str, beside: "OpenRun | None" = None, runs: int = 1
+    ) -> None:
+        """beside : a run of the same body, cameras and footage, which is closed later and whose frames this one has.
+        runs : how many are open.
+        """
         self.session = Session(Path(session_folder))
         self.stored = self.session.run(Path(run_folder).name)
         self._ahead = ThreadPoolExecutor(1, thread_name_prefix="next-frame")
         self._views = ThreadPoolExecutor(VIEW_THREADS, thread_name_prefix="view")
         self._storing = ThreadPoolExecutor(1, thread_name_prefix="storing")
-        self._problems = self._problem_source()
+        self._beside, self._waiting = beside, max(MOST_WAITING // runs, 1)
+        self._problems = beside._problems if beside else self._problem_source()
         try:
             self.tracking = self._tracking_run(self._problems)
         except StudioError:
@@ -245,10 +252,11 @@ class OpenRun:
         )
 
     def _tracking_run(self, problems: ProblemSource) -> TrackingRun:
-        return TrackingRun(self.stored, problems, self._storing)
+        return TrackingRun(self.stored, problems, self._storing, self._waiting)
 
     def _close_problems(self) -> None:
-        self._problems.close()
+        if self._beside is None:
+            self._problems.close()
         self._ahead.shutdown()
         self._views.shutdown()
         self._storing.shutdown()

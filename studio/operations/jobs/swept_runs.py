@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from studio.foundations.progress import report
-from studio.operations.jobs.batch import track_to_end
+from studio.operations.jobs.batch import track_to_end, track_together
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.sweep import measured_run
 from studio.results.comparison.trials import ALLOW_INCONSISTENT, kept_as
@@ -25,10 +25,39 @@ def measure_run(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, 
     session in a store also one of another machine, and the tracked run is put there.
     """
     session = cache.session(arguments["footage"])
-    bring_runs(session, arguments["run"])
-    run = _earlier_attempt(session, arguments) or _new(session, arguments)
-    if run.summary(blobs=False).done < run.record.frame_count:
+    run = _begun(session, arguments)
+    if _is_unfinished(run):
         track_to_end(session, run, report)
+    return _measured(session, run)
+
+
+@kept_as("swept_runs.measure_runs")
+def measure_runs(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Track runs of a session side by side and measure them as `measure_run`: `measured`, the fields of each one's
+    `Swept`.
+
+    arguments : `trials`, those of each. Where they fail together, they are tracked one by one.
+    """
+    trials = arguments["trials"]
+    session = cache.session(trials[0]["footage"])
+    runs = [_begun(session, one) for one in trials]
+    try:
+        track_together(session, [run for run in runs if _is_unfinished(run)], report)
+    except Exception:
+        return {"measured": [measure_run(one, cache) for one in trials]}
+    return {"measured": [_measured(session, run) for run in runs]}
+
+
+def _begun(session: Session, arguments: Mapping[str, Any]) -> StoredRun:
+    bring_runs(session, arguments["run"])
+    return _earlier_attempt(session, arguments) or _new(session, arguments)
+
+
+def _is_unfinished(run: StoredRun) -> bool:
+    return run.summary(blobs=False).done < run.record.frame_count
+
+
+def _measured(session: Session, run: StoredRun) -> dict[str, Any]:
     if run.name not in remote_runs(session):
         put_run(session, run)
     return asdict(measured_run(session, run))

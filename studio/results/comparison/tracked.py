@@ -33,7 +33,7 @@ from studio.runs.sides import known_silhouettes
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.behaviour.model_file import read_model
 from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.likelihood.devices import CPU
+from studio.search.likelihood.devices import CPU, DEVICE_KNOB
 from studio.search.likelihood.hard_priors import HardPriors
 from studio.search.settings import RunSettings, changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS
@@ -363,12 +363,17 @@ def seeds_at_once(trial: TrackingTrial, seeds: int, processes: int) -> int:
 
     processes : that track at once. What the processor refines is left to all of them.
     """
-    if trial.changes.get("device", CPU) == CPU or trial.behaviour:
+    return 1 if trial.behaviour else runs_at_once(settings_of(trial), seeds, processes)
+
+
+def runs_at_once(settings: RunSettings, runs: int, processes: int) -> int:
+    """How many of the runs with such settings a card searches side by side, 1 where none does; see `seeds_at_once`."""
+    if getattr(settings.weighting, DEVICE_KNOB, CPU) == CPU:
         return 1
-    settings, tracker = settings_of(trial), TRACKERS[trial.tracker]
+    tracker = TRACKERS[settings.tracker_name]
     poses = tracker.evaluations(settings.tracker) // tracker.layer_count(settings.tracker)
     most = min(max(POSES_AT_ONCE // poses, 1), SEEDS_AT_ONCE)
-    return min(most, -(-seeds // processes)) if settings.refinement.refine_frames else most
+    return min(most, -(-runs // processes)) if settings.refinement.refine_frames else most
 
 
 @kept_as("tracking_trials.measure_seeds")

@@ -156,6 +156,16 @@ def device_for(chosen: str, make: "Callable[[ModuleType], WeighingDevice]") -> "
     raise StudioError(f"A GPU cannot be used: {why}.", NO_DEVICE_HINT)
 
 
+def is_missing(settings: Any) -> bool:  # noqa: ANN401 - any likelihood's
+    """Whether the processor weighs by such settings on this machine because `auto` finds no card that works."""
+    if getattr(settings, DEVICE_KNOB, CPU) != AUTO:
+        return False
+    try:
+        return bool(importlib.import_module(DEVICE_MODULE).missing())
+    except Exception:
+        return True
+
+
 def without_device(chosen: str, error: StudioError) -> tuple[str, ...]:
     """A note that says why the processor evaluates. Raises the error where the settings ask for the card."""
     if chosen == GPU:

@@ -62,6 +62,7 @@ from studio.search.trackers.tracker import (
     LayerRecord,
     ParticleSet,
     SearchSpace,
+    Tracker,
 )
 
 
@@ -72,6 +73,10 @@ class AnnealedParticleFilter(ParticleFilter[AnnealedSettings]):
     label = "Annealed particle filter"
     settings_type = AnnealedSettings
     size_knobs = (("layers", "particles"),)
+    own_knobs = Tracker.own_knobs | {
+        "survival", "survival_per_layer", "crossover", "adaptive_diffusion", "diffusion_scale", "diffusion_form",
+        "diffusion_fraction", "diffusion_constant", "diffusion_covariance", "diffusion_decay", "dynamics",
+    }  # fmt: skip
     variants = VARIANTS
     presets = PRESETS
 

@@ -21,7 +21,14 @@ from studio.search.trackers.particles import first_set, predict, uniform_poses, 
 from studio.search.trackers.random_numbers import RandomNumbers
 from studio.search.trackers.resampling import draw
 from studio.search.trackers.settings import CondensationSettings
-from studio.search.trackers.tracker import Arrays, FilterState, LayerRecord, ParticleSet, SearchSpace
+from studio.search.trackers.tracker import (
+    Arrays,
+    FilterState,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+)
 
 SCALES = "log_scales"
 
@@ -33,6 +40,7 @@ class Condensation(OneLayerFilter[CondensationSettings]):
     label = "Condensation"
     settings_type = CondensationSettings
     scales_likelihood = True
+    own_knobs = Tracker.own_knobs | {"scale_survival", "scale_frames", "diffusion_scale", "dynamics"}
 
     def begin_frame(
         self,

@@ -158,7 +158,7 @@ class Launched(Generic[Set]):
     records: Callable[[], list[LayerRecord]]
     layer: int = -1
     moments: tuple[Moment, ...] = ()
-    settings: Any = None
+    settings: tuple[Any, ...] = ()
 
 
 class LayersAhead(ABC, Generic[Set]):
@@ -174,10 +174,12 @@ class LayersAhead(ABC, Generic[Set]):
         """What the next layer weighs."""
         self._ahead: Launched[Set] | None = None
 
-    def step(self, layer: int, numbers: Sequence[RandomNumbers], settings: Any) -> list[LayerRecord]:  # noqa: ANN401
-        """Do a layer and return its records."""
+    def step(
+        self, layer: int, numbers: Sequence[RandomNumbers], settings: Sequence[Any]
+    ) -> list[LayerRecord]:
+        """Do a layer and return its records. settings : one a run."""
         assert self._set is not None
-        moments = tuple(Moment(*one.key) for one in numbers)
+        settings, moments = tuple(settings), tuple(Moment(*one.key) for one in numbers)
         done, self._ahead = self._ahead, None
         if done is None or (done.layer, done.moments, done.settings) != (layer, moments, settings):
             given = self._set if done is None else self._put_back(self._set)
@@ -194,14 +196,17 @@ class LayersAhead(ABC, Generic[Set]):
         return records
 
     @abstractmethod
-    def _launch(self, given: Set, layer: int, moments: Sequence[Moment], settings: Any) -> Launched[Set]:  # noqa: ANN401
+    def _launch(
+        self, given: Set, layer: int, moments: Sequence[Moment], settings: Sequence[Any]
+    ) -> Launched[Set]:
         """Launch a layer."""
 
-    def _may_follow(self, layer: int, settings: Any) -> bool:  # noqa: ANN401
+    def _may_follow(self, layer: int, settings: Sequence[Any]) -> bool:
         """Whether there is such a layer, which a device does, too."""
-        if layer >= self._tracker.layer_count(settings):
+        if layer >= self._tracker.layer_count(settings[0]):
             return False
-        return all(self._tracker.fits_device(layer, space, settings, {}) for space in self._spaces)
+        fits = self._tracker.fits_device
+        return all(fits(layer, space, own, {}) for space, own in zip(self._spaces, settings, strict=True))
 
     def _kept(self, given: Set) -> Set:
         """A set that stays as it is while a layer is done from the one given."""
@@ -211,7 +216,7 @@ class LayersAhead(ABC, Generic[Set]):
         """A set that a layer can be done from, of one that was kept."""
         return kept
 
-    def _heed(self, records: Sequence[LayerRecord], settings: Any) -> bool:  # noqa: ANN401
+    def _heed(self, records: Sequence[LayerRecord], settings: Sequence[Any]) -> bool:
         """Whether the next layer is another than the one that would have been done without these records."""
         return False
 

@@ -149,6 +149,7 @@ class DeviceFilter(DeviceRuns):
         plans have no noise). The problem's pictures are those of all runs, or one frame for each.
         """
         size, count, noise = len(self.space.names), given.count, plans[0].noise
+        correlated = any(one.noise is not None and one.noise.correlated for one in plans)
         whole = self.runs * count
         keys, dials = self._uploaded(moments, plans)
         weights = self._memory("weights", (2, whole), np.float64)
@@ -177,14 +178,13 @@ class DeviceFilter(DeviceRuns):
                 given.poses, cumulated, keys, count, systematic, dials, self._place, survivors, parents
             )
             kernel("find_moments")[blocks](survivors, count, SURVIVING, found)
-            if noise.correlated:
+            if correlated:
                 pairs = (size, size, self.runs), SUMMING, self._stream
                 kernel("find_correlations")[pairs](survivors, count, found, self._root)
                 kernel("find_root")[-(-self.runs // 32), 32, self._stream](self._root)
             kernel("spread")[grid](survivors, found, self._root, dials, keys, self._limits, count, poses)
             kernel("find_moments")[blocks](poses, count, DIFFUSED, found)
 
-        correlated = noise is not None and noise.correlated
         place = id(given.poses), id(poses), problem.frame.memory, every
         self._launch((*place, problem.factors, problem.frame.scale, count, correlated, systematic), launch)
         weighed = DeviceSet(given.poses, count, given.turn, cumulated, weights, annealed)
@@ -295,13 +295,13 @@ class DeviceSearch(LayersAhead[DeviceSet]):
         tracker: ParticleFilter[Any],
         problem: ProblemOnDevice,
         spaces: Sequence[SearchSpace],
-        settings: Any,  # noqa: ANN401
+        settings: Sequence[Any],
     ) -> None:
-        """settings : those that the frame begins with."""
+        """settings : of each run, those that the frame begins with."""
         super().__init__(tracker, spaces)
         self._filter_kind, self._problem = tracker, problem
-        by_limbs = getattr(settings, "crossover_by", "limbs") == "limbs"
-        clamped = settings.constraints == "clamp"
+        by_limbs = getattr(settings[0], "crossover_by", "limbs") == "limbs"
+        clamped = settings[0].constraints == "clamp"
         self._filter = DeviceFilter(problem.device, spaces[0], len(spaces), by_limbs, clamped)
         self._extras = list[Arrays]()
 
@@ -309,23 +309,25 @@ class DeviceSearch(LayersAhead[DeviceSet]):
         self,
         previous: Sequence[FilterState],
         numbers: Sequence[RandomNumbers],
-        settings: Any,  # noqa: ANN401
+        settings: Sequence[Any],
     ) -> None:
         """Make the first layer's sets from what the last frame left."""
         last = [one.particles for one in previous if one.particles is not None]
         self._extras = [one.extra for one in last]
         shifts = np.zeros((len(last), len(self._spaces[0].names)))
-        for shift, one in zip(shifts, previous, strict=True):
+        for shift, one, own in zip(shifts, previous, settings, strict=True):
             now, before = one.estimate, one.previous_estimate
-            if settings.dynamics != "none" and now is not None and before is not None:
+            if own.dynamics != "none" and now is not None and before is not None:
                 shift[:] = now - before
         self._set = self._filter.begin(
             self._filter.take(last),
             [Moment(*one.key) for one in numbers],
-            settings.particles,
-            np.array([space.sigma for space in self._spaces]) * settings.diffusion_scale,
-            getattr(settings, "carry", "resampled"),
-            settings.resampling == "systematic",
+            settings[0].particles,
+            np.array(
+                [space.sigma * own.diffusion_scale for space, own in zip(self._spaces, settings, strict=True)]
+            ),
+            getattr(settings[0], "carry", "resampled"),
+            settings[0].resampling == "systematic",
             shifts,
         )
 
@@ -346,22 +348,23 @@ class DeviceSearch(LayersAhead[DeviceSet]):
         given: DeviceSet,
         layer: int,
         moments: Sequence[Moment],
-        settings: Any,  # noqa: ANN401
+        settings: Sequence[Any],
     ) -> Launched[DeviceSet]:
         plans = list[LayerPlan]()
-        for space, extra in zip(self._spaces, self._extras, strict=True):
-            plan = self._filter_kind.plan_layer(layer, space, settings, extra)
+        for space, own, extra in zip(self._spaces, settings, self._extras, strict=True):
+            plan = self._filter_kind.plan_layer(layer, space, own, extra)
             assert plan is not None
             plans.append(plan)
-        systematic = settings.resampling == "systematic"
+        systematic = settings[0].resampling == "systematic"
         weighed, following = self._filter.step(given, self._problem, moments, plans, systematic)
         wanted, is_last = [plan.survival for plan in plans], plans[0].noise is None
         sent = self._filter.send(weighed, layer, wanted, is_last=is_last)
         return Launched(following, given.count, sent)
 
-    def _heed(self, records: Sequence[LayerRecord], settings: Any) -> bool:  # noqa: ANN401
+    def _heed(self, records: Sequence[LayerRecord], settings: Sequence[Any]) -> bool:
         before, kind = self._extras, self._filter_kind
         self._extras = [
-            kind.kept_of_layer(extra, record, settings) for extra, record in zip(before, records, strict=True)
+            kind.kept_of_layer(extra, record, own)
+            for extra, record, own in zip(before, records, settings, strict=True)
         ]
         return any(one is not other for one, other in zip(before, self._extras, strict=True))

@@ -348,21 +348,25 @@ class DeviceSearch(LayersAhead[_Staged]):
         tracker: ParticleSwarm,
         problem: ProblemOnDevice,
         spaces: Sequence[SearchSpace],
-        settings: SwarmSettings,
+        settings: Sequence[SwarmSettings],
     ) -> None:
         super().__init__(tracker, spaces)
         self._problem = problem
         self._swarm = DeviceSwarm(problem.device, spaces[0], len(spaces))
 
     def begin(
-        self, previous: Sequence[FilterState], numbers: Sequence[RandomNumbers], settings: SwarmSettings
+        self,
+        previous: Sequence[FilterState],
+        numbers: Sequence[RandomNumbers],
+        settings: Sequence[SwarmSettings],
     ) -> None:
         """Sample the first stage's swarms about x̂."""
-        first = stages_of(self._spaces[0].hierarchy, settings)[0]
-        starts = np.array([predict_pose(one, settings) for one in previous])
+        shared = settings[0]
+        first = stages_of(self._spaces[0].hierarchy, shared)[0]
+        starts = np.array([predict_pose(one, shared) for one in previous])
         moments = [Moment(*one.key) for one in numbers]
-        samples = self._sampling(settings, first.freedom)
-        sampled = self._swarm.sample(starts, moments, first.particles, samples, settings.constraints)
+        samples = self._sampling(shared, first.freedom)
+        sampled = self._swarm.sample(starts, moments, first.particles, samples, shared.constraints)
         self._set = _Staged(sampled, first.freedom)
 
     def take(self, sets: Sequence[ParticleSet]) -> None:
@@ -375,26 +379,27 @@ class DeviceSearch(LayersAhead[_Staged]):
         return self._swarm.give(self._set.swarm, self._set.freedom)
 
     def _launch(
-        self, given: _Staged, layer: int, moments: Sequence[Moment], settings: SwarmSettings
+        self, given: _Staged, layer: int, moments: Sequence[Moment], settings: Sequence[SwarmSettings]
     ) -> Launched[_Staged]:
-        stages = stages_of(self._spaces[0].hierarchy, settings)
+        shared = settings[0]
+        stages = stages_of(self._spaces[0].hierarchy, shared)
         now = moment_of(stages, layer)
         stage = stages[now.number]
         trunk_first = seen_in(stage, given.freedom) == TRUNK_FIRST
         steps, sampled, freedom = None, 0, given.freedom
         if now.iteration < stage.iterations:
-            c = acceleration(now.iteration + 1, stage.iterations, settings.c_first, settings.c_last)
-            steps = [SwarmStep(one.sigma, c) for one in self._sampling(settings, freedom)]
+            c = acceleration(now.iteration + 1, stage.iterations, shared.c_first, shared.c_last)
+            steps = [SwarmStep(one.sigma, c) for one in self._sampling(shared, freedom)]
         elif now.number + 1 < len(stages):
             following = stages[now.number + 1]
             freedom, sampled = following.freedom, following.particles
-            steps = self._sampling(settings, freedom)
+            steps = self._sampling(shared, freedom)
         weighed, moved = self._swarm.step(
             given.swarm,
             self._problem,
             moments,
             steps,
-            constraints=settings.constraints,
+            constraints=shared.constraints,
             trunk_first=trunk_first,
             sampled=sampled,
         )

@@ -367,7 +367,7 @@ class DeviceSearch(LayersAhead[_Rung]):
         tracker: TemperedFilter,
         problem: ProblemOnDevice,
         spaces: Sequence[SearchSpace],
-        settings: TemperedSettings,
+        settings: Sequence[TemperedSettings],
     ) -> None:
         super().__init__(tracker, spaces)
         self._problem = problem
@@ -378,19 +378,20 @@ class DeviceSearch(LayersAhead[_Rung]):
         self,
         previous: Sequence[FilterState],
         numbers: Sequence[RandomNumbers],
-        settings: TemperedSettings,
+        settings: Sequence[TemperedSettings],
     ) -> None:
         """Draw the first layer's sets from the priors that the last frame left."""
-        bounded = settings.constraints != "ignore"
+        shared = settings[0]
+        bounded = shared.constraints != "ignore"
         self._priors = [
             FramePrior.of_frame(
-                one, space, scale=settings.diffusion_scale, dynamics=settings.dynamics, bounded=bounded
+                one, space, scale=shared.diffusion_scale, dynamics=shared.dynamics, bounded=bounded
             )
             for one, space in zip(previous, self._spaces, strict=True)
         ]
         self._ladder.set_priors(self._priors)
         moments = [Moment(*one.key) for one in numbers]
-        self._set = _Rung(self._ladder.draw(moments, settings.particles, bounded=bounded))
+        self._set = _Rung(self._ladder.draw(moments, shared.particles, bounded=bounded))
 
     def take(self, sets: Sequence[ParticleSet]) -> None:
         """Go on from sets of the host."""
@@ -412,11 +413,11 @@ class DeviceSearch(LayersAhead[_Rung]):
         ]
 
     def _launch(
-        self, given: _Rung, layer: int, moments: Sequence[Moment], settings: TemperedSettings
+        self, given: _Rung, layer: int, moments: Sequence[Moment], settings: Sequence[TemperedSettings]
     ) -> Launched[_Rung]:
-        is_last = layer == settings.layers - 1
+        is_last = layer == settings[0].layers - 1
         weighed, following = self._ladder.climb(
-            given.moves, self._problem, moments, settings, is_last=is_last
+            given.moves, self._problem, moments, settings[0], is_last=is_last
         )
         sent = self._ladder.send_climbed(weighed, following, layer, is_last=is_last)
         return Launched(_Rung(following, weighed if is_last else None), given.moves.count, sent)

@@ -9,7 +9,7 @@ settings, wherever it was interrupted.
 import dataclasses
 import importlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -107,6 +107,8 @@ class FrameSearch:
         """On the card, with its particles, those of all searches that are stepped together."""
         self._place = 0
         """Its number among these."""
+        self._beside = 1
+        """How many these are."""
         self._prepared: tuple[FrameLikelihood, int, FrameLikelihood] | None = None
 
     @property
@@ -129,6 +131,11 @@ class FrameSearch:
         return None if self._prepared is None else self._prepared[2]
 
     @property
+    def layers_done(self) -> int:
+        """Layers done, of all repeats."""
+        return self._state.layers_done
+
+    @property
     def layer_count(self) -> int:
         """Layers of one of its searches; 0 before the first layer."""
         return self._state.layer_count
@@ -144,7 +151,7 @@ class FrameSearch:
 
         Knobs that take effect with the next frame keep the value they had when the search began.
         """
-        return step_together((self,), problem, version, settings)[0]
+        return step_together((self,), problem, ((version, settings),))[0]
 
     def next_layer(self, version: int, settings: Any) -> NextLayer:  # noqa: ANN401
         """What the next layer is done with. Raises RunError where none is left."""
@@ -186,7 +193,7 @@ class FrameSearch:
     ) -> LayerRecord:
         """The record of a layer that a card has done since `began`, of the search with number `place` of so many."""
         assert self.on_device is not None
-        self._place, self._prepared = place, (problem, at.repeat, problem)
+        self._place, self._beside, self._prepared = place, of, (problem, at.repeat, problem)
         is_last = self._state.layers_done + 1 == self.repeats * at.count
         memory: Mapping[str, Array] = self.previous.memory if is_last else {}
         evaluated = self.on_device.evaluated
@@ -243,6 +250,17 @@ class FrameSearch:
             milliseconds=state.milliseconds,
             carried=FilterState(state.particles, estimate.pose, self.previous.estimate, state.memory),
         )
+
+    def in_common(self, version: int, settings: Any) -> Hashable:  # noqa: ANN401
+        """What searches of one frame's likelihood have in common whose next layers may be done together."""
+        at, given = self.next_layer(version, settings), self.previous.particles
+        begins_with = -1 if given is None else len(given.poses)
+        shared = tuple(self.tracker.shared_knobs(at.in_use).items())
+        return self.tracker.name, self.layers_done, self.fits_device(at), begins_with, shared
+
+    def is_on(self, device: SearchOnDevice | None, searches: int) -> bool:
+        """Whether its particles are there, among those of so many searches."""
+        return device is not None and self.on_device is device and self._beside == searches
 
     def fits_device(self, at: NextLayer) -> bool:
         """Whether a card can do the next layer."""
@@ -329,7 +347,7 @@ def search_together(
     settings = None
     while not searches[0].finished:
         version, settings = settings_source()
-        for record in step_together(searches, problem, version, settings):
+        for record in step_together(searches, problem, ((version, settings),) * len(searches)):
             if on_layer is not None:
                 on_layer(record)
     return [search.result(settings) for search in searches]
@@ -338,13 +356,15 @@ def search_together(
 def step_together(
     searches: Sequence[FrameSearch],
     problem: FrameLikelihood,
-    version: int,
-    settings: Any,  # noqa: ANN401
+    given: Sequence[tuple[int, Any]],
 ) -> list[LayerRecord]:
-    """Do one layer of each of a frame's searches, which have the same tracker and as many layers done: side by side
-    where a card does it, else one after the other. Each has the result that it has alone.
+    """Do one layer of each of a frame's searches: side by side where a card does it, else one after the other. Each has
+    the result that it has alone.
+
+    given : version and settings of each; of these all searches have the same `in_common`.
     """
-    began, at = time.perf_counter(), [search.next_layer(version, settings) for search in searches]
+    began = time.perf_counter()
+    at = [search.next_layer(*one) for search, one in zip(searches, given, strict=True)]
     records = _step_on_device(searches, problem, at)
     if records is None:
         return [search.step_here(problem, one) for search, one in zip(searches, at, strict=True)]
@@ -368,9 +388,10 @@ def _step_on_device(
     first, layer = searches[0], at[0].layer
     try:
         on_device = first.on_device
-        if on_device is None or layer == 0:
+        held = all(search.is_on(on_device, len(searches)) for search in searches)
+        if on_device is None or not held or layer == 0:
             on_device = _begun_on_device(searches, there, at)
-        records = on_device.step(layer, [one.numbers for one in at], at[0].in_use)
+        records = on_device.step(layer, [one.numbers for one in at], [one.in_use for one in at])
     except StudioError:
         raise
     except Exception as error:
@@ -391,7 +412,7 @@ def _begun_on_device(
     searches: Sequence[FrameSearch], there: "ProblemOnDevice", at: Sequence[NextLayer]
 ) -> SearchOnDevice:
     """Searches on a card, with the sets that a layer weighs."""
-    tracker, settings = searches[0].tracker, at[0].in_use
+    tracker, settings = searches[0].tracker, [one.in_use for one in at]
     module = importlib.import_module(tracker.device_module)
     spaces = [search.space for search in searches]
     on_device: SearchOnDevice = module.DeviceSearch(tracker, there, spaces, settings)

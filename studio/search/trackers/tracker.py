@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.foundations.arrays import Array, Indices
-from studio.foundations.knobs import Value
+from studio.foundations.knobs import Value, knobs_of
 from studio.search.behaviour.model import BehaviourModel
 from studio.search.likelihood.problem import FrameLikelihood
 from studio.search.trackers.random_numbers import RandomNumbers
@@ -275,8 +275,8 @@ class Variant:
 
 
 class SearchOnDevice(Protocol):
-    """Searches of one frame on a card, one a run, a layer at a time, made of tracker, problem, the runs' spaces and the
-    frame's settings. evaluated : poses of each that the last layer weighed.
+    """Searches of one frame on a card, one a run, a layer at a time, made of tracker, problem, and the runs' spaces and
+    settings of the frame, one a run. evaluated : poses of each that the last layer weighed.
     """
 
     evaluated: int
@@ -285,7 +285,7 @@ class SearchOnDevice(Protocol):
         self,
         previous: Sequence[FilterState],
         numbers: Sequence[RandomNumbers],
-        settings: Any,  # noqa: ANN401
+        settings: Sequence[Any],
     ) -> None:
         """Make the first layer's sets from what the last frame left."""
         ...
@@ -294,7 +294,9 @@ class SearchOnDevice(Protocol):
         """Go on from sets of the host."""
         ...
 
-    def step(self, layer: int, numbers: Sequence[RandomNumbers], settings: Any) -> list[LayerRecord]:  # noqa: ANN401
+    def step(
+        self, layer: int, numbers: Sequence[RandomNumbers], settings: Sequence[Any]
+    ) -> list[LayerRecord]:
         """Do a layer and return its records."""
         ...
 
@@ -319,6 +321,7 @@ class Tracker(ABC, Generic[S]):
     needs_behaviour : it requires a behaviour model.
     scales_likelihood : it multiplies log w by its own scale (`beta` of its records).
     device_module : the module whose `DeviceSearch` (see `SearchOnDevice`) does its layers on a card; "" has none.
+    own_knobs : names of knobs in which searches may differ that a card does side by side.
     score : name of the best particle's reported value, and its unit.
     variants : known changes, by label, for comparisons.
     presets : for the pages, offered where a run has all knobs that they set.
@@ -334,9 +337,15 @@ class Tracker(ABC, Generic[S]):
     needs_behaviour: ClassVar[bool] = False
     scales_likelihood: ClassVar[bool] = False
     device_module: ClassVar[str] = ""
+    own_knobs: ClassVar[frozenset[str]] = frozenset({"estimate", "start_repeats"})
     score: ClassVar[tuple[str, str]] = ("Best weight", "log w")
     variants: ClassVar[Mapping[str, Variant]] = {}
     presets: ClassVar[tuple[Preset, ...]] = ()
+
+    def shared_knobs(self, settings: S) -> dict[str, Value]:
+        """What searches have in common that a card does side by side: all knobs but `own_knobs`."""
+        known = knobs_of(settings)
+        return {one.name: getattr(settings, one.name) for one in known if one.name not in self.own_knobs}
 
     def evaluations(self, settings: S) -> int:
         """Poses weighed in a frame; in the first frame: in each of its `start_repeats` searches."""

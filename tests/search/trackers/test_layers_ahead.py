@@ -28,15 +28,18 @@ class Ladder(LayersAhead[str]):
         self._set, self.heeds = "start", heeds
         self.done = list[str]()
 
-    def _launch(self, given: str, layer: int, moments: Sequence[Moment], settings: Any) -> Launched[str]:  # noqa: ANN401
-        name = f"{layer} of {given} by {settings} with {','.join(str(one.layer) for one in moments)}"
-        self.done.append(f"launch {layer} by {settings}")
+    def _launch(
+        self, given: str, layer: int, moments: Sequence[Moment], settings: Sequence[str]
+    ) -> Launched[str]:
+        words = "".join(dict.fromkeys(settings))
+        name = f"{layer} of {given} by {words} with {','.join(str(one.layer) for one in moments)}"
+        self.done.append(f"launch {layer} by {words}")
 
         def records() -> list[Any]:
             self.done.append(f"read {layer}")
             return [name]
 
-        return Launched(f"{given}/{layer}{settings}", 10 + layer, records)
+        return Launched(f"{given}/{layer}{words}", 10 + layer, records)
 
     def _kept(self, given: str) -> str:
         return f"kept {given}"
@@ -47,10 +50,10 @@ class Ladder(LayersAhead[str]):
     def _heed(self, records: Sequence[Any], settings: Any) -> bool:  # noqa: ANN401
         return self.heeds
 
-    def step_to(self, layer: int, settings: str, *, first: int = 7) -> list[Any]:
+    def step_to(self, layer: int, words: str, *, first: int = 7) -> list[Any]:
         """Step a layer, whose random numbers are those of layer `first` + layer."""
         runs = len(self._spaces)
-        return self.step(layer, [RandomNumbers(run, 2, first + layer) for run in range(runs)], settings)
+        return self.step(layer, [RandomNumbers(run, 2, first + layer) for run in range(runs)], words * runs)
 
 
 def test_each_layer_is_launched_before_the_last_ones_records_are_read() -> None:
