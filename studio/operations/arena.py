@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +15,7 @@ from studio.foundations.errors import NotFoundError, RunError, SessionError
 from studio.foundations.foreign_files import read_file
 from studio.foundations.progress import Progress
 from studio.foundations.typed_decoding import decode_json
+from studio.operations.jobs.process_executor import cores
 from studio.operations.jobs.trials import TrialResult, run_jobs
 from studio.operations.opening import RunName, keeping_in_place, open_run, session_of
 from studio.operations.progress import Reporting, reporting
@@ -24,9 +25,18 @@ from studio.results.arena.problem_files import write_problems
 from studio.results.arena.profiles import Trial
 from studio.results.arena.race_files import DOCUMENT, PAGE, RaceDocument, race_document, write_race
 from studio.results.arena.racers import RACERS, SUFFIX, Racer, racer_named
-from studio.results.arena.racing import as_trial, chosen, defined_in, measure_race, planned
+from studio.results.arena.racing import (
+    as_trial,
+    chosen,
+    defined_in,
+    measure_race,
+    measure_races,
+    planned,
+    races_in_common,
+)
 from studio.results.comparison import trials as kinds
 from studio.results.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by, plain
+from studio.results.comparison.tracked import SEEDS_AT_ONCE
 from studio.results.comparison.trials import Outcome, TrialJob, measure_name
 from studio.results.inspection.reading import InspectedRun
 from studio.search.likelihood.devices import CPU, Device
@@ -317,32 +327,50 @@ def _outcomes(
     before = len(outcomes)
     report("", before, len(by_key))
 
-    def on_result(job: TrialJob, result: TrialResult) -> None:
+    def on_result(first: TrialJob, result: TrialResult) -> None:
         if result.measured is None:
             raise ArenaError(result.failure, "What was finished is kept; correct it and race again.")
-        values = result.measured
-        kept.write(
-            job.key,
-            KeptOutcome(values, "", result.seconds, measured_by(), now(), job.label, job.arguments),
-        )
-        outcomes[job.key] = Outcome(by_key[job.key], values)
-        report(job.label, len(outcomes), len(by_key))
+        group = groups[first.key]
+        measured = [result.measured] if len(group) == 1 else result.measured["measured"]
+        for job, values in zip(group, measured, strict=True):
+            seconds = result.seconds / len(group)
+            kept.write(
+                job.key, KeptOutcome(values, "", seconds, measured_by(), now(), job.label, job.arguments)
+            )
+            outcomes[job.key] = Outcome(by_key[job.key], values)
+            report(job.label, len(outcomes), len(by_key))
 
     jobs = [
         TrialJob(key, ARENA, trial.label, plain(trial.arguments), measure_race, (), None, alone=False)
         for key, trial in by_key.items()
         if key not in outcomes
     ]
+    groups = {group[0].key: group for group in _side_by_side(jobs, processes or cores())}
     if jobs:
         report("starting", before, len(by_key))
         run_jobs(
-            jobs,
+            [_as_one(group) for group in groups.values()],
             kept.folder.parent,
             on_result,
             processes,
             checkpoint=lambda: report("", len(outcomes), len(by_key)),
         )
     return [outcomes[key] for key in keys], before
+
+
+def _side_by_side(jobs: Sequence[TrialJob], processes: int) -> list[list[TrialJob]]:
+    """The jobs in groups whose poses a card weighs together, enough of them for all processes."""
+    most = min(SEEDS_AT_ONCE, -(-len(jobs) // processes))
+    alike = dict[str, list[TrialJob]]()
+    for job in jobs:
+        alike.setdefault(races_in_common(job.arguments) or job.key, []).append(job)
+    return [seeds[at : at + most] for seeds in alike.values() for at in range(0, len(seeds), most)]
+
+
+def _as_one(group: Sequence[TrialJob]) -> TrialJob:
+    if len(group) == 1:
+        return group[0]
+    return replace(group[0], arguments={"trials": [job.arguments for job in group]}, measure=measure_races)
 
 
 def _key(trial: kinds.Trial) -> str:

@@ -30,7 +30,7 @@ from studio.results.comparison.tracked import (
 from studio.results.comparison.trials import Outcome, Trial, TrialJob
 from studio.runs.search_space import search_space
 from studio.runs.setup.session_settings import session_settings
-from studio.search.likelihood.devices import is_missing
+from studio.search.likelihood.devices import CPU, DEVICE_KNOB, is_processor
 from studio.search.settings import RunSettings
 from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.manifest import now
@@ -219,7 +219,11 @@ def _runs_at_once(session: Session, job: TrialJob, runs: int, processes: int) ->
     settings, body = _settings(session, job), session.body(job.arguments["body"] or None)
     space = search_space(body, np.zeros(len(body.parameters)))
     fits = TRACKERS[settings.tracker_name].fits_device(0, space, settings.tracker, {})
-    if not fits or job.arguments.get("behaviour") or is_missing(settings.weighting):
+    if (
+        not fits
+        or job.arguments.get("behaviour")
+        or is_processor(getattr(settings.weighting, DEVICE_KNOB, CPU))
+    ):
         return 1
     return runs_at_once(settings, runs, processes)
 

@@ -8,7 +8,7 @@ same function as everybody else.
 
 import hashlib
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -219,6 +219,8 @@ class Problem:
     evaluations: int = 0
     seconds: float = 0.0
     improvements: list[Improvement] = field(default_factory=list[Improvement])
+    weigh_whole: Callable[[Array], Array] | None = None
+    """Weighs poses of the whole body, together with those of other races; None: by itself."""
     _refused: int = 0
 
     def __repr__(self) -> str:
@@ -344,8 +346,12 @@ class Problem:
         weights = np.full(len(poses), -np.inf)
         inside = np.flatnonzero(np.all((poses >= self.lower) & (poses <= self.upper), axis=1))
         if len(inside):
-            weights[inside] = self.definition.maps.likelihood.log_likelihood(self.whole(poses[inside]))
+            weights[inside] = (self.weigh_whole or self.weigh_alone)(self.whole(poses[inside]))
         return weights
+
+    def weigh_alone(self, poses: Array) -> Array:
+        """(N,) of the whole body's poses (N, D'), which it can take."""
+        return self.definition.maps.likelihood.log_likelihood(poses)
 
     def whole(self, poses: Array) -> Array:
         """The body's poses of poses (N, D)."""

@@ -174,13 +174,10 @@ _OTHERS = (
     Racer("dual-annealing", "Dual annealing", _search_by_dual_annealing),
     Racer("random-search", "Random search", _search_at_random),
 )
-RACERS: Registry[Racer] = Registry(
-    "racer",
-    "studio.racers",
-    Racer,
-    (*(_racer_of_tracker(name) for name in TRACKERS if not TRACKERS[name].needs_behaviour), *_OTHERS),
-    _check,
-)
+_OWN = (*(_racer_of_tracker(name) for name in TRACKERS if not TRACKERS[name].needs_behaviour), *_OTHERS)
+OWN_RACERS = frozenset(racer.name for racer in _OWN)
+"""Names of those that ask for poses in one thread."""
+RACERS: Registry[Racer] = Registry("racer", "studio.racers", Racer, _OWN, _check)
 
 
 def racer_named(name: str) -> Racer:

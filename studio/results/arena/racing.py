@@ -1,24 +1,27 @@
 """A racer on a problem as a trial: kept as other trials are, run in any process, not measured twice."""
 
 import hashlib
+import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from studio.foundations.arrays import Array
 from studio.foundations.errors import StudioError
 from studio.foundations.foreign_files import read_file
 from studio.results.arena.problem import ArenaError, BudgetSpentError, DeafError, Definition, Problem
 from studio.results.arena.problem_files import BUNDLED, read_problems
 from studio.results.arena.profiles import Trial
-from studio.results.arena.racers import RACERS, SUFFIX, Racer, racer_named
+from studio.results.arena.racers import OWN_RACERS, RACERS, SUFFIX, Racer, racer_named
+from studio.results.arena.turns import Weigh, race_in_turns
 from studio.results.comparison import trials
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.kept_trials import code_digest
 from studio.results.comparison.trials import Outcome, kept_as
-from studio.search.likelihood.devices import CPU, DEVICE_KNOB
+from studio.search.likelihood.devices import CPU, DEVICE_KNOB, is_processor
 
 DIGEST_LENGTH = 16
 CODE = ("results/arena",)
@@ -117,18 +120,72 @@ def measure_race(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str,
 
     Raises ArenaError for a problem that is another by now, and for what the racer raises.
     """
+    problem = Problem(_definition_of(arguments), arguments["evaluations"])
+    began = time.perf_counter()
+    run_racer(racer_named(arguments["racer"]), problem, arguments["seed"])
+    return _measured(problem, arguments["seed"], time.perf_counter() - began)
+
+
+@kept_as("arena.measure_races")
+def measure_races(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
+    """Run a racer on a problem with several seeds, whose poses are weighed together: `measured`, what `measure_race`
+    gives of each, seconds as shares of all.
+
+    arguments : `trials`, those of each.
+    """
+    trials = arguments["trials"]
+    definition, racer = _definition_of(trials[0]), racer_named(trials[0]["racer"])
+    problems = [Problem(definition, one["evaluations"]) for one in trials]
+
+    def race_of(problem: Problem, seed: int) -> Callable[[Weigh], None]:
+        def race(weigh: Weigh) -> None:
+            problem.weigh_whole = weigh
+            run_racer(racer, problem, seed)
+
+        return race
+
+    weighing, began = 0.0, time.perf_counter()
+
+    def weigh(poses: Array) -> Array:
+        nonlocal weighing
+        asked = time.perf_counter()
+        weights = problems[0].weigh_alone(poses)
+        weighing += time.perf_counter() - asked
+        return weights
+
+    race_in_turns([race_of(one, trial["seed"]) for one, trial in zip(problems, trials, strict=True)], weigh)
+    share = (time.perf_counter() - began) / len(trials)
+    for problem in problems:
+        problem.weigh_whole, problem.seconds = None, weighing / len(trials)
+    return {
+        "measured": [
+            _measured(problem, one["seed"], share) for problem, one in zip(problems, trials, strict=True)
+        ]
+    }
+
+
+def races_in_common(arguments: Mapping[str, Any]) -> str:
+    """The same for trials that differ by seed alone and whose poses a card may weigh together; "" for others."""
+    (definition,) = chosen(defined_in(arguments["set"]), [arguments["problem"]])
+    on_card = DEVICE_KNOB in definition.maps.knobs and not is_processor(arguments.get(DEVICE_KNOB, CPU))
+    if not on_card or arguments["racer"] not in OWN_RACERS:
+        return ""
+    return json.dumps({**arguments, "seed": None}, sort_keys=True)
+
+
+def _definition_of(arguments: Mapping[str, Any]) -> Definition:
     (definition,) = chosen(defined_in(arguments["set"]), [arguments["problem"]])
     best = definition.best
     if best is None or best.hash != arguments["hash"]:
         raise ArenaError(f"Problem '{definition.name}' has changed meanwhile.", "Begin the race again.")
     device = arguments.get(DEVICE_KNOB, CPU)
-    if device != CPU:
-        definition = weighed_by(definition, device)
-    problem = Problem(definition, arguments["evaluations"])
-    began = time.perf_counter()
-    run_racer(racer_named(arguments["racer"]), problem, arguments["seed"])
-    seconds = time.perf_counter() - began
-    drawn = poses_after(problem, SHOWN_AFTER) if arguments["seed"] == 0 else {}
+    return definition if device == CPU else weighed_by(definition, device)
+
+
+def _measured(problem: Problem, seed: int, seconds: float) -> dict[str, Any]:
+    best = problem.best
+    assert best is not None
+    drawn = poses_after(problem, SHOWN_AFTER) if seed == 0 else {}
     return {
         "evaluations": problem.evaluations,
         "seconds": round(seconds, 4),

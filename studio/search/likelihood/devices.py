@@ -156,10 +156,10 @@ def device_for(chosen: str, make: "Callable[[ModuleType], WeighingDevice]") -> "
     raise StudioError(f"A GPU cannot be used: {why}.", NO_DEVICE_HINT)
 
 
-def is_missing(settings: Any) -> bool:  # noqa: ANN401 - any likelihood's
-    """Whether the processor weighs by such settings on this machine because `auto` finds no card that works."""
-    if getattr(settings, DEVICE_KNOB, CPU) != AUTO:
-        return False
+def is_processor(chosen: str) -> bool:
+    """Whether the setting `device` leaves the work to the processor on this machine, as `auto` does without a card."""
+    if chosen != AUTO:
+        return chosen == CPU
     try:
         return bool(importlib.import_module(DEVICE_MODULE).missing())
     except Exception:

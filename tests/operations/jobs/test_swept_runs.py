@@ -1,5 +1,6 @@
 """Sweeps worked at to the end: runs that are kept, broken off, gone on with, the same whatever happened."""
 
+import importlib
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -8,11 +9,13 @@ from sample_walk import copy_of_walk
 from tracked_runs import finish, poses_of
 
 from studio.operations.comparison_folders import new_comparison, place_of, runs_of
+from studio.operations.jobs import comparison_run, swept_runs
 from studio.operations.jobs.comparison_run import done_before, run_comparison
-from studio.operations.jobs.swept_runs import measure_run
+from studio.operations.jobs.swept_runs import measure_run, measure_runs
 from studio.results.comparison.footage_cache import FootageCache
 from studio.results.comparison.sweep import conclude_sweep, plan_sweep, sweep_document, sweep_trials
 from studio.runs.new_run import prepare_run
+from studio.search.likelihood.devices import DEVICE_MODULE
 from studio.sessions.provenance import note
 from studio.sessions.session import Session
 
@@ -118,3 +121,62 @@ def test_a_doubted_calibration_is_tracked_despite_it(walk: Session) -> None:
         sweep = run_comparison(kept, walk, lambda *_: None, conclude_sweep, executor=threads)
     assert [run.name for run in runs_of(walk, kept).values()] == [one.run for one in sweep.runs]
     assert f"Tracked despite: {doubt}" in walk.run(sweep.runs[0].run).record.notes
+
+
+@pytest.mark.parametrize(
+    ("knobs", "sizes"),
+    [
+        ({"device": "gpu"}, [2, 2, 2, 2]),
+        ({"device": "gpu", "refine_frames": False}, [4, 4]),
+        ({"device": "gpu", "refine_frames": False, "particles": 100_000}, [2, 2, 2, 2]),
+        ({"device": "gpu", "limbs_apart": True}, [1] * 8),
+        ({"device": "auto"}, [1] * 8),
+        ({}, [1] * 8),
+    ],
+)
+def test_runs_that_a_card_can_search_side_by_side_are_tracked_together(
+    walk: Session, knobs: dict[str, object], sizes: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that differ by seed and rate, not by the likelihood's edge samples; without a card `auto` shares nothing.
+    What the processor refines is shared among its two processes.
+    """
+    monkeypatch.setattr(importlib.import_module(DEVICE_MODULE), "missing", lambda: "no card here")
+    plan = plan_sweep(
+        walk, {**GRID, "edge_samples": [16, 32]}, range(2), knobs=knobs, last=2, fit_shape=False
+    )
+    kept = new_comparison(place_of(walk), plan)
+    work = comparison_run._Work.of(plan)
+    jobs = [comparison_run._job(kept, work, key) for key in work.trials]
+    groups = comparison_run._side_by_side(walk, jobs, 2)
+    assert [len(group) for group in groups] == sizes
+    for group in groups:
+        assert len({job.arguments["changes"]["edge_samples"] for job in group}) == 1
+        assert comparison_run._as_one(group).measure is (measure_run if len(group) == 1 else measure_runs)
+    assert sorted(job.key for group in groups for job in group) == sorted(work.trials)
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_runs_tracked_together_are_measured_as_alone(
+    walk: Session, fails: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where they cannot be, and are tracked one by one."""
+
+    def too_much(*_: object) -> None:
+        raise MemoryError
+
+    if fails:
+        monkeypatch.setattr(swept_runs, "track_together", too_much)
+    knobs = {"layers": 1, "particles": 10, "refine_frames": False}
+    plan = plan_sweep(walk, GRID, range(1), knobs=knobs, last=2, fit_shape=False)
+    trials = [trial.arguments for trial in sweep_trials(plan)]
+    cache = FootageCache(walk.path.parent)
+    try:
+        named = [{**one, "run": f"together-{fails}-{number}"} for number, one in enumerate(trials)]
+        together = measure_runs({"trials": named}, cache)["measured"]
+        for number, (one, found) in enumerate(zip(trials, together, strict=True)):
+            alone = measure_run({**one, "run": f"alone-{fails}-{number}"}, cache)
+            assert {**found, "milliseconds": 0, "run": ""} == {**alone, "milliseconds": 0, "run": ""}
+            assert found["run"] == f"together-{fails}-{number}"
+            np.testing.assert_array_equal(poses_of(walk.run(found["run"])), poses_of(walk.run(alone["run"])))
+    finally:
+        cache.close()
