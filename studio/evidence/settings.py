@@ -94,6 +94,8 @@ class EvidenceSettings:
         help="What looks like a shadow is none if another camera sees the floor there empty and something above the"
         " floor can be what all cameras see. Needs two cameras or more above a floor at z = 0.",
     )
+    # Twelve drawn clips in the colours of their rooms (`studio reproduce shadow-test`), body called background: 5.9 %
+    # without, 4.3 at 0.1, 4.0 at 0.05; shadows called body 0.26, 0.39 and 0.41. Cameras differ by more than drawn ones.
     mask_shadow_alike: float = next_frame_knob(
         0.1,
         0.0,
