@@ -23,7 +23,8 @@ MOST_ARROWS = 70
 BY_NAME = {
     "studio/foundations/first_use.py": "the studio's and the arena's verbs, what packages that add to the studio take",
     "studio/cli/main.py": "the command that was called",
-    "studio/search/likelihood/edge_region.py": "the card's kernels, of the same room",
+    "studio/search/likelihood/bodytrack.py": "the card's kernels, of the same room",
+    "studio/search/likelihood/devices.py": "the card's kernels, of the same room",
     "studio/search/trackers/frame_loop.py": "the card's search, of the same room",
     "studio/garden/benchmarks/devices.py": "what is measured of a card, of the same room",
     "studio/cli/self_check.py": "what the card's kernels need",

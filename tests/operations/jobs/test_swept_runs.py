@@ -142,7 +142,13 @@ def test_runs_that_a_card_can_search_side_by_side_are_tracked_together(
     """
     monkeypatch.setattr(importlib.import_module(DEVICE_MODULE), "missing", lambda: "no card here")
     plan = plan_sweep(
-        walk, {**GRID, "edge_samples": [16, 32]}, range(2), knobs=knobs, last=2, fit_shape=False
+        walk,
+        {**GRID, "edge_samples": [32, 64]},
+        range(2),
+        knobs=knobs,
+        last=2,
+        fit_shape=False,
+        allow_inconsistent=True,
     )
     kept = new_comparison(place_of(walk), plan)
     work = comparison_run._Work.of(plan)
@@ -167,7 +173,7 @@ def test_runs_tracked_together_are_measured_as_alone(
     if fails:
         monkeypatch.setattr(swept_runs, "track_together", too_much)
     knobs = {"layers": 1, "particles": 10, "refine_frames": False}
-    plan = plan_sweep(walk, GRID, range(1), knobs=knobs, last=2, fit_shape=False)
+    plan = plan_sweep(walk, GRID, range(1), knobs=knobs, last=2, fit_shape=False, allow_inconsistent=True)
     trials = [trial.arguments for trial in sweep_trials(plan)]
     cache = FootageCache(walk.path.parent)
     try:

@@ -91,8 +91,8 @@ def test_a_frame_comes_nearer_and_the_next_starts_there(body: BodyModel, truth: 
 def test_a_lost_arm_is_resampled(body: BodyModel, truth: np.ndarray, refined) -> None:
     names = [entry.name for entry in body.parameters]
     pose = truth.copy()
-    pose[names.index("left_shoulder_ry")] += 1.4
-    pose[names.index("left_elbow_ry")] -= 1.0
+    pose[names.index("left_shoulder_ry")] -= 1.2
+    pose[names.index("left_elbow_ry")] -= 1.5
     pose = np.clip(pose, [e.lower for e in body.parameters], [e.upper for e in body.parameters])
     stuck = refined(pose, FrameRefinementSettings(redraw_limbs=False))
     found = refined(pose)
