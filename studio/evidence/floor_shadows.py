@@ -378,7 +378,7 @@ def on_floor(
             continue
         along = (height - centre[2]) / ray[2]
         x, y = centre[0] + along * ray[0], centre[1] + along * ray[1]
-        hidden = denied = 0
+        hidden = bare = 0
         for other in range(len(maps)):
             if other == owners[k]:
                 continue
@@ -390,9 +390,9 @@ def on_floor(
                 explained[k] = True
                 break
             hidden += there == HIDDEN
-            denied += there == NO_SHADOW
+            bare += there == NO_SHADOW
         else:
-            explained[k] = hidden > 0 and (own[k] == 0.0 or denied == 0)
+            explained[k] = hidden > 0 and (own[k] == 0.0 or bare == 0)
     return explained
 
 
