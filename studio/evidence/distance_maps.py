@@ -19,7 +19,7 @@ MOST_POINTS = 300
 """Border points kept of a view: about every other pixel of a person 200 pixels tall."""
 SMOOTHED = 1.5
 """Standard deviation, pixels, of the smoothing before a border's direction is measured."""
-BESIDE_HIDDEN = 2
+BESIDE_UNKNOWN = 2
 """Pixels from where a mask says nothing within which its border is none of the body's."""
 MARGIN_SHARE = 16
 """Distances are kept up to this from the silhouette, as a share of the picture's longer side."""
@@ -44,7 +44,7 @@ class SilhouetteDistances:
 
 def silhouette_distances(evidence: FrameEvidence, most: int = MOST_POINTS) -> tuple[SilhouetteDistances, ...]:
     """The distances of every view's mask. most : border points kept of a view."""
-    return tuple(distances_of(view.mask, most, hidden=view.hidden) for view in evidence.views)
+    return tuple(distances_of(view.mask, most, unknown=view.unknown) for view in evidence.views)
 
 
 _known: WeakKeyDictionary[FrameEvidence, dict[int, Mapping[str, SilhouetteDistances]]] = WeakKeyDictionary()
@@ -59,20 +59,20 @@ def silhouettes_by_camera(
     by_points = _known.setdefault(evidence, {})
     if most not in by_points:
         by_points[most] = {
-            view.camera: distances_of(view.mask, most, exact=False, hidden=view.hidden)
+            view.camera: distances_of(view.mask, most, exact=False, unknown=view.unknown)
             for view in evidence.views
         }
     return by_points[most]
 
 
 def distances_of(
-    mask: Bytes, most: int = MOST_POINTS, *, exact: bool = True, hidden: Bytes | None = None
+    mask: Bytes, most: int = MOST_POINTS, *, exact: bool = True, unknown: Bytes | None = None
 ) -> SilhouetteDistances:
-    """The distances of a mask (H, W); empty and full masks have no border. hidden : as in `ViewEvidence`."""
+    """The distances of a mask (H, W); empty and full masks have no border. unknown : as in `ViewEvidence`."""
     size = (mask.shape[1], mask.shape[0])
     left, top, right, bottom = box_of(mask, np.uint8(FOREGROUND))
-    if right and hidden is not None:
-        box = box_of(hidden, np.uint8(1))
+    if right and unknown is not None:
+        box = box_of(unknown, np.uint8(1))
         if box[2]:
             left, top = min(left, box[0]), min(top, box[1])
             right, bottom = max(right, box[2]), max(bottom, box[3])
@@ -86,21 +86,21 @@ def distances_of(
     inside = np.greater_equal(mask[top:bottom, left:right], FOREGROUND).view(np.uint8)
     measure = _distances if exact else _stepped_distances
     signed = signed_of(inside, measure(inside), measure(1 - inside))
-    unknown = None if hidden is None else np.ascontiguousarray(hidden[top:bottom, left:right])
+    open_part = None if unknown is None else np.ascontiguousarray(unknown[top:bottom, left:right])
     contours, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     points = np.concatenate([np.zeros((0, 2), np.int64), *(contour[:, 0] for contour in contours)]).astype(
         np.int64
     )
     x, y = points[:, 0] + left, points[:, 1] + top
     kept = (x > 0) & (y > 0) & (x < size[0] - 1) & (y < size[1] - 1)
-    if unknown is not None:
-        side = 2 * BESIDE_HIDDEN + 1
-        near = np.asarray(cv2.dilate(unknown, np.ones((side, side), np.uint8)))
+    if open_part is not None:
+        side = 2 * BESIDE_UNKNOWN + 1
+        near = np.asarray(cv2.dilate(open_part, np.ones((side, side), np.uint8)))
         kept &= near[points[:, 1], points[:, 0]] == 0
     points = points[kept][:: max(1, -(-int(kept.sum()) // most))]
     outward = slopes_at(points, np.asarray(cv2.GaussianBlur(signed, (0, 0), SMOOTHED), np.float32))
-    if unknown is not None:
-        signed = np.where(unknown > 0, np.float32(0.0), signed)
+    if open_part is not None:
+        signed = np.where(open_part > 0, np.float32(0.0), signed)
     return SilhouetteDistances(size, (left, top), signed, points + np.array([left, top], np.float64), outward)
 
 

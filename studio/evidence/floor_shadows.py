@@ -5,7 +5,7 @@ The shadow test of one camera (`background`) cannot tell a forearm on a floor of
 other cameras can. A shadow on the floor z = 0 is changed for the cameras that see that place of the floor, and as dark
 for them: a floor scatters light to all sides. Where none sees the place so, what hides it from the first camera may
 stand above the floor: on the pixel's ray, at a place that every camera sees changed. Pixels for which both holds are
-the subject's. All is decided on cells of some pixels.
+the subject's; where only one does, nobody can tell. All is decided on cells of some pixels.
 
 Where the floor is not at z = 0, as on a table or a stage, shadows would be taken for the subject. So where all that
 changed stays clearly above z = 0, the floor is what is lowest of it. Lengths are shares of the distance between the
@@ -45,6 +45,14 @@ PART = 0.06
 the other cameras by things that stand on the floor."""
 NO_SHADOW, HIDDEN, SHADOW = 0, 1, 2
 """What a camera sees of a place of the floor."""
+DENIED, DOUBTED, LIES_THERE = 0, 1, 2
+"""What all cameras together say of a shadow on the floor."""
+CONFIRMING, DENYING = 2, 2
+"""Other cameras that see a shadow, without which it is doubted, and that see bare floor, so that one alone that sees a
+shadow does not count. Of twelve drawn people in the colours of their rooms, what one camera confirms and something
+above the floor may hide is the subject's by three parts of seven; what two confirm, by one part of twenty."""
+SUBJECT, UNKNOWN = 1, 2
+"""Of cells that look like a shadow: what they are instead, and where that cannot be told."""
 SAMPLED, LOWER, AROUND = 800, 0.03, 0.05
 """About so many changed cells tell where the scene is; which of their lowest places, in order of height, is the floor
 at most; share of the distance by which the scene is larger."""
@@ -108,13 +116,14 @@ def cells_of(mask: Bytes, shadow: Bytes | None, brightness: Floats | None = None
     return Cells(kinds, size, brightness)
 
 
-def with_cells(mask: Bytes, shadow: Bytes, chosen: Bytes, size: int) -> Bytes:
-    """A mask (H, W) with what passes for shadow in some cells. chosen : (h, w) above 0. size : of a cell, pixels."""
+def pixels_of(shadow: Bytes, chosen: NDArray[np.bool_], size: int) -> Bytes | None:
+    """(H, W) what passes for shadow, of it only what lies in some cells; None where no cell is chosen. shadow : (H, W).
+    chosen : (h, w). size : of a cell, pixels.
+    """
     if not chosen.any():
-        return mask
-    whole = cv2.resize(chosen, None, fx=size, fy=size, interpolation=cv2.INTER_NEAREST)
-    rows, columns = mask.shape
-    return np.where(whole[:rows, :columns] > 0, mask | shadow, mask)
+        return None
+    whole = cv2.resize(chosen.view(np.uint8), None, fx=size, fy=size, interpolation=cv2.INTER_NEAREST)
+    return np.where(whole[: shadow.shape[0], : shadow.shape[1]] > 0, shadow, np.uint8(0))
 
 
 @functools.lru_cache(maxsize=8)
@@ -152,9 +161,10 @@ class FloorShadows:
         self.usable = bool((centres[:, 2] > CLEARLY_ABOVE * self._distance).all())
         self._rays = functools.cache(self._rays_of)
 
-    def unexplained(self, seen: Sequence[Cells], tolerance: float = 0.0) -> list[Bytes]:
-        """For each camera (h, w) above 0 where a cell looks like a shadow and cannot be one. seen : one a camera.
-        tolerance : by which the logarithms of a shadow's brightness differ between cameras at most, where it is known.
+    def unexplained(self, seen: Sequence[Cells], tolerance: float = 0.0, doubts: bool = False) -> list[Bytes]:
+        """For each camera (h, w) SUBJECT where a cell looks like a shadow and cannot be one, UNKNOWN where that cannot
+        be told, else 0. seen : one a camera. tolerance : by which the logarithms of a shadow's brightness differ
+        between cameras at most, where it is known. doubts : whether any may be unknown; else such a one is a shadow.
         """
         kinds = [cells.kinds.ravel() for cells in seen]
         chosen = [np.zeros_like(cells.kinds) for cells in seen]
@@ -171,8 +181,9 @@ class FloorShadows:
             [cells.brightness.ravel()[at] for cells, at in zip(seen, like, strict=True)]
         )
 
-        def shadows_at(height: float) -> NDArray[np.bool_]:
-            return on_floor(everything, bright, maps, self._views, owners, rays, each, tolerance, height)
+        def shadows_at(height: float) -> NDArray[np.uint8]:
+            given = everything, bright, maps, self._views, owners, rays, each, tolerance, height, doubts
+            return on_floor(*given)
 
         explained = shadows_at(0.0)
         if scene[0, 2] > 0.0:
@@ -180,19 +191,25 @@ class FloorShadows:
             # z = 0 explains more, what stands on it is hidden, or calibrations are off.
             heights = scene[0, 2] + self._distance * np.arange(*FLOORS)
             others = [shadows_at(height) for height in heights]
-            most = int(np.argmax([other.sum() for other in others]))
-            if others[most].sum() > explained.sum():
+            counts = [np.count_nonzero(other) for other in others]
+            most, at_zero = int(np.argmax(counts)), np.count_nonzero(explained)
+            if counts[most] > at_zero:
                 explained, scene[0, 2] = others[most], heights[most]
-            elif others[most].sum() < explained.sum():
+            elif counts[most] < at_zero:
                 scene[0, 2] = 0.0
         scene[0, 2] += (ABOVE if tolerance else CLEARLY_ABOVE) * self._distance
+        certain = explained == LIES_THERE
         places = lowest_changed(
-            everything, maps, self._views, owners, rays, explained, scene, STEP * self._distance, least
+            everything, maps, self._views, owners, rays, certain, scene, STEP * self._distance, least
         )
-        anywhere = np.isfinite(places[:, 2])
+        anywhere, denied = np.isfinite(places[:, 2]), explained == DENIED
+        unknown = doubts & (denied | (~certain & anywhere))
         for number, (own, cells) in enumerate(zip(like, seen, strict=True)):
-            chosen[number].ravel()[own[anywhere[owners == number]]] = 1
+            mine, cell = owners == number, chosen[number].ravel()
+            cell[own[(denied & anywhere)[mine]]] = SUBJECT
             _drop_lesser_parts(chosen[number], cells.kinds)
+            open_cells = own[unknown[mine]]
+            cell[open_cells[cell[open_cells] != SUBJECT]] = UNKNOWN
         return chosen
 
     def _scene(self, kinds: Bytes, seen: Sequence[Cells], maps: NDArray[np.int64]) -> Array | None:
@@ -365,20 +382,24 @@ def on_floor(
     own: Floats,
     tolerance: float,
     height: float,
-) -> NDArray[np.bool_]:
-    """(K,) whether what is behind a cell on the floor, at a height (mm), may be shadow: some other camera sees one as
-    dark there, or the place is hidden from all that see it; where a cell's own brightness is not known that it
-    is hidden from one is enough. kinds, brightness : of all cells. maps, views : as of `cell_at`. owners : (K,) the
-    cells' cameras. rays : (K, 3). own : (K,) the cells' brightness. tolerance : as of `is_shadow_there`.
+    doubts: bool,
+) -> NDArray[np.uint8]:
+    """(K,) whether what is behind a cell on the floor, at a height (mm), may be shadow (DENIED, DOUBTED, LIES_THERE):
+    some other camera sees one as dark there, or the place is hidden from all that see it; where a cell's own brightness
+    is not known that it is hidden from one is enough. kinds, brightness : of all cells. maps, views : as of `cell_at`.
+    owners : (K,) the cells' cameras. rays : (K, 3). own : (K,) the cells' brightness. tolerance : as of
+    `is_shadow_there`. doubts : whether to doubt, where brightness is known, what fewer than CONFIRMING see of those
+    that look there, and to deny what one sees and DENYING do not.
     """
-    explained = np.zeros(len(rays), np.bool_)
+    explained = np.zeros(len(rays), np.uint8)
     for k in range(len(rays)):
         ray, centre = rays[k], views[owners[k], 23:]
         if ray[2] >= 0.0:
             continue
         along = (height - centre[2]) / ray[2]
         x, y = centre[0] + along * ray[0], centre[1] + along * ray[1]
-        hidden = bare = 0
+        hidden = bare = shadows = 0
+        asks = doubts and own[k] > 0.0
         for other in range(len(maps)):
             if other == owners[k]:
                 continue
@@ -386,13 +407,18 @@ def on_floor(
             if row < 0:
                 continue
             there = is_shadow_there(kinds, brightness, maps[other], row, column, own[k], tolerance)
-            if there == SHADOW:
-                explained[k] = True
-                break
+            shadows += there == SHADOW
             hidden += there == HIDDEN
             bare += there == NO_SHADOW
-        else:
-            explained[k] = hidden > 0 and (own[k] == 0.0 or bare == 0)
+            if shadows and not asks:
+                break
+        if shadows:
+            if asks and shadows < CONFIRMING and bare >= DENYING:
+                continue
+            confirmed = not asks or shadows >= min(CONFIRMING, shadows + hidden + bare)
+            explained[k] = LIES_THERE if confirmed else DOUBTED
+        elif hidden > 0 and (own[k] == 0.0 or bare == 0):
+            explained[k] = DOUBTED if asks else LIES_THERE
     return explained
 
 

@@ -1,6 +1,9 @@
 """The evidence of one frame."""
 
+import functools
 from dataclasses import dataclass
+
+import numpy as np
 
 from studio.evidence.yuv_background import YuvBackground
 from studio.foundations.arrays import Bytes
@@ -18,9 +21,9 @@ class ViewEvidence:
     edges : (H, W) uint8 edge proximity map, 255 = on an edge (Eq. 14's p = edges / 255).
     background : the camera's empty view where the hull is to be carved from pixels; None: from the mask. A view with a
         background may have a mask of zeros, where none is needed.
-    hidden : (H, W) uint8, above 0 where the mask says nothing of the body, since another subject is in front of it;
-        None: nowhere. Distances of silhouettes (`distance_maps`) leave it out; likelihoods weigh its pixels like any
-        other, the processor and a card alike.
+    unknown : (H, W) uint8, 255 where it cannot be told whether a pixel is the body's: another subject is in front of
+        it, or it looks like a shadow that too few cameras confirm; else 0. None: nowhere. Distances of silhouettes
+        (`distance_maps`) leave it out, a hull is not carved by it (`open_mask`), likelihoods count it by `half_mask`.
     """
 
     camera: str
@@ -28,7 +31,28 @@ class ViewEvidence:
     mask: Bytes
     edges: Bytes
     background: YuvBackground | None = None
-    hidden: Bytes | None = None
+    unknown: Bytes | None = None
+
+
+def half_mask(view: ViewEvidence) -> Bytes:
+    """(H, W) the mask, with every second square of two by two pixels of the background that may be the body's: an area
+    of it, at full or half resolution, counts half on either side, on a processor and a card alike.
+    """
+    return view.mask if view.unknown is None else view.mask | (view.unknown & _squares(*view.mask.shape))
+
+
+def open_mask(view: ViewEvidence) -> Bytes:
+    """(H, W) the mask with all that may be the body's."""
+    return view.mask if view.unknown is None else view.mask | view.unknown
+
+
+@functools.lru_cache(maxsize=16)
+def _squares(height: int, width: int) -> Bytes:
+    """A chessboard of two by two pixels, shared and read-only."""
+    rows, columns = np.indices((height, width), sparse=True)
+    board = np.where((rows // 2 + columns // 2) % 2 == 0, np.uint8(255), np.uint8(0))
+    board.setflags(write=False)
+    return board
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)

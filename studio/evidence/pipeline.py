@@ -17,7 +17,15 @@ from cachetools import LRUCache
 
 from studio.evidence.backgrounds import Backgrounds, FittedKind
 from studio.evidence.edges import bodytrack_edges, proximity_edges
-from studio.evidence.floor_shadows import Cells, cells_of, floor_shadows, with_cells
+from studio.evidence.floor_shadows import (
+    SUBJECT,
+    UNKNOWN,
+    Cells,
+    FloorShadows,
+    cells_of,
+    floor_shadows,
+    pixels_of,
+)
 from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence, ViewEvidence
 from studio.evidence.masks import PackedMask, cleaned
 from studio.evidence.settings import EvidenceSettings
@@ -41,13 +49,15 @@ class RawMask:
     """A camera's mask (H, W), 0 or 255, before its clean-up.
 
     to_clean : whether it is to be cleaned. shadow : (H, W), 255 where a pixel changed but passes for a shadow; None:
-    nowhere. brightness : of shadows, by cell, as in `Foreground`.
+    nowhere. brightness : of shadows, by cell, as in `Foreground`. unknown : (H, W), above 0 where it cannot be told
+    whether it is one; None: nowhere.
     """
 
     mask: Bytes
     to_clean: bool
     shadow: Bytes | None = None
     brightness: Floats | None = None
+    unknown: Bytes | None = None
 
 
 class PackedRaw:
@@ -109,9 +119,7 @@ class EvidenceMaker:
             raw = self.without_false_shadows(raw)
 
         def finished(camera: str) -> ViewEvidence:
-            with span("mask", frame):
-                mask = self.finished_mask(camera, raw[camera])
-            return self.of_mask(camera, frame, mask, self._hidden(camera, frame))
+            return self._view_of(camera, frame, raw[camera])
 
         return FrameEvidence(frame, tuple(self._each(finished, self.cameras)))
 
@@ -123,10 +131,13 @@ class EvidenceMaker:
             nothing = _nothing(picture.shape[0], picture.shape[1])
             background = self._backgrounds.yuv(camera, self.settings.hull_noise)
             return ViewEvidence(camera, picture, nothing, nothing, background)
-        return self.of_mask(camera, frame, self.mask(camera, frame), self._hidden(camera, frame))
+        return self._view_of(camera, frame, self._raw_as_of_all(camera, frame))
 
     def mask(self, camera: str, frame: int) -> Bytes:
         """(H, W) 0 or 255: one camera's mask of a frame, as in the evidence of all."""
+        return self.finished(camera, self._raw_as_of_all(camera, frame))[0]
+
+    def _raw_as_of_all(self, camera: str, frame: int) -> RawMask:
         raw = self.raw_mask(camera, frame, self.footage.picture(camera, frame))
         if raw.shadow is not None and self._tests_floor():
             self.note(camera, frame, raw)
@@ -136,7 +147,13 @@ class EvidenceMaker:
                     self.note(other, frame)
             seen = {name: self._cells[name, frame] for name in present}
             raw = self._without({camera: raw}, seen)[camera]
-        return self.finished_mask(camera, raw)
+        return raw
+
+    def _view_of(self, camera: str, frame: int, raw: RawMask) -> ViewEvidence:
+        with span("mask", frame):
+            mask, unknown = self.finished(camera, raw)
+        given = self._hidden(camera, frame)
+        return self.of_mask(camera, frame, mask, unknown if given is None else given)
 
     def views(
         self, cameras: Sequence[str], frames: Sequence[int], progress: Callable[[int, int], None]
@@ -162,7 +179,9 @@ class EvidenceMaker:
             self._cells[camera, frame] = cells_of(raw.mask, raw.shadow, raw.brightness)
 
     def without_false_shadows(self, raw: Mapping[str, RawMask]) -> dict[str, RawMask]:
-        """A frame's masks by camera, with what looked like shadows but cannot be any on the floor."""
+        """A frame's masks by camera, with what looked like shadows but cannot be any on the floor, and where that
+        cannot be told.
+        """
         if not self._tests_floor() or all(one.shadow is None for one in raw.values()):
             return dict(raw)
         return self._without(
@@ -182,15 +201,7 @@ class EvidenceMaker:
             for name, one in raw.items()
         ):
             return dict(raw)
-        chosen = dict(
-            zip(seen, tells.unexplained(tuple(seen.values()), self.settings.mask_shadow_alike), strict=True)
-        )
-        return {
-            name: one
-            if one.shadow is None
-            else replace(one, mask=with_cells(one.mask, one.shadow, chosen[name], seen[name].size))
-            for name, one in raw.items()
-        }
+        return with_shadows_decided(raw, seen, tells, self.settings)
 
     def _hidden(self, camera: str, frame: int) -> Bytes | None:
         given = self.settings.background_model in ("auto", "mask")
@@ -201,11 +212,12 @@ class EvidenceMaker:
             [make(one) for one in items] if self._executor is None else list(self._executor.map(make, items))
         )
 
-    def of_mask(self, camera: str, frame: int, mask: Bytes, hidden: Bytes | None) -> ViewEvidence:
-        """One camera's evidence with a given mask (H, W), 0 or 255. hidden : as in `ViewEvidence`."""
+    def of_mask(self, camera: str, frame: int, mask: Bytes, unknown: Bytes | None) -> ViewEvidence:
+        """One camera's evidence with a given mask (H, W), 0 or 255. unknown : as in `ViewEvidence`."""
         picture = self.footage.picture(camera, frame)
         with span("edges", frame):
-            return ViewEvidence(camera, picture, mask, self._edges(picture, mask), hidden=hidden)
+            around = mask if unknown is None else mask | unknown
+            return ViewEvidence(camera, picture, mask, self._edges(picture, around), unknown=unknown)
 
     def _from_pixels(self) -> bool:
         """Whether a hull is carved from pixels: by the knob; "auto": if all cameras have an empty view, none masks."""
@@ -240,15 +252,9 @@ class EvidenceMaker:
         shadow = found.shadow if self.settings.mask_shadow_test else None
         return RawMask(found.mask, True, shadow, found.brightness)
 
-    def finished_mask(self, camera: str, raw: RawMask) -> Bytes:
-        """(H, W) 0 or 255: a raw mask, cleaned if `to_clean`, without excluded areas."""
-        excluded = self._backgrounds.exclusion(camera)
-
-        def without(mask: Bytes) -> Bytes:
-            return mask if excluded is None else np.where(excluded > 0, np.uint8(0), mask)
-
-        # Before cleaning too: what does not count is not the largest piece.
-        return without(cleaned(without(raw.mask), self.settings)) if raw.to_clean else without(raw.mask)
+    def finished(self, camera: str, raw: RawMask) -> tuple[Bytes, Bytes | None]:
+        """A camera's raw mask and what is unknown of it, as by `finished`."""
+        return finished(raw, self.settings, self._backgrounds.exclusion(camera))
 
     def _edges(self, picture: Bytes, mask: Bytes) -> Bytes:
         """The edge map that the weighting uses."""
@@ -260,6 +266,46 @@ class EvidenceMaker:
         return proximity_edges(
             picture, knobs.edge_threshold, knobs.edge_smoothing, mask, knobs.edge_near_mask
         )
+
+
+def with_shadows_decided(
+    raw: Mapping[str, RawMask], seen: Mapping[str, Cells], tells: FloorShadows, settings: EvidenceSettings
+) -> dict[str, RawMask]:
+    """Raw masks by camera with what looks like a shadow and is none, and with what is unknown. seen : the cells of all
+    cameras of `tells`, in their order.
+    """
+    told = tells.unexplained(tuple(seen.values()), settings.mask_shadow_alike, settings.mask_shadow_doubt)
+    cells = dict(zip(seen, told, strict=True))
+
+    def decided(name: str, one: RawMask, shadow: Bytes) -> RawMask:
+        size = seen[name].size
+        body, unknown = (pixels_of(shadow, cells[name] == kind, size) for kind in (SUBJECT, UNKNOWN))
+        return replace(one, mask=one.mask if body is None else one.mask | body, unknown=unknown)
+
+    return {name: one if one.shadow is None else decided(name, one, one.shadow) for name, one in raw.items()}
+
+
+def finished(
+    raw: RawMask, settings: EvidenceSettings, excluded: Bytes | None = None
+) -> tuple[Bytes, Bytes | None]:
+    """(H, W) 0 or 255: a raw mask, cleaned if `to_clean`; and, as in `ViewEvidence`, where it is unknown whether a
+    pixel belongs to it. What is unknown holds the pieces of a mask together. excluded : (H, W) above 0 where nothing is
+    the subject's.
+    """
+
+    def without(mask: Bytes) -> Bytes:
+        return mask if excluded is None else np.where(excluded > 0, np.uint8(0), mask)
+
+    def tidy(mask: Bytes, knobs: EvidenceSettings) -> Bytes:
+        # Before cleaning too: what does not count is not the largest piece.
+        return without(cleaned(without(mask), knobs)) if raw.to_clean else without(mask)
+
+    if raw.unknown is None or not raw.unknown.any():
+        return tidy(raw.mask, settings), None
+    whole = tidy(raw.mask | raw.unknown, settings)
+    mask = whole & tidy(raw.mask, replace(settings, mask_min_component=0, mask_keep_components=0))
+    unknown = whole - mask
+    return mask, unknown if unknown.any() else None
 
 
 @functools.lru_cache(maxsize=16)

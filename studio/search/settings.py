@@ -29,6 +29,7 @@ BEFORE: dict[str, Value] = {
     "mask_shadow_window": 1,
     "mask_shadow_floor": False,
     "mask_shadow_alike": 0.0,
+    "mask_shadow_doubt": False,
 }
 # Knobs that are gone; what they did cannot be done again.
 GONE = ("mask_shadow_learnt",)

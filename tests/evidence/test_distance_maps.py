@@ -71,7 +71,7 @@ def test_where_a_mask_says_nothing_there_is_neither_distance_nor_border() -> Non
     mask = disc()
     hidden = np.zeros_like(mask)
     hidden[:, 36:58] = 255
-    whole, found = distances_of(mask), distances_of(mask, hidden=hidden)
+    whole, found = distances_of(mask), distances_of(mask, unknown=hidden)
     (left, top), (begin, first) = whole.corner, found.corner
     assert begin + found.signed.shape[1] >= 58
     assert not found.signed[:, 36 - begin : 58 - begin].any()
@@ -84,7 +84,7 @@ def test_where_a_mask_says_nothing_there_is_neither_distance_nor_border() -> Non
 
 
 def test_a_mask_that_is_known_everywhere_has_the_same_distances() -> None:
-    whole, found = distances_of(disc()), distances_of(disc(), hidden=np.zeros_like(disc()))
+    whole, found = distances_of(disc()), distances_of(disc(), unknown=np.zeros_like(disc()))
     assert found.corner == whole.corner
     assert np.array_equal(found.signed, whole.signed)
     assert np.array_equal(found.border, whole.border)
@@ -107,7 +107,7 @@ def test_distances_do_not_depend_on_where_the_mask_lies(exact: bool) -> None:
 def test_distances_cover_what_is_hidden_far_from_the_mask(left: int, top: int) -> None:
     hidden = np.zeros_like(disc())
     hidden[top : top + 6, left : left + 6] = 1
-    found = distances_of(disc(), hidden=hidden)
+    found = distances_of(disc(), unknown=hidden)
     x, y = left - found.corner[0], top - found.corner[1]
     assert x >= 0
     assert y >= 0
@@ -182,16 +182,16 @@ def test_border_points_are_every_so_manieth_and_none_within_two_pixels_of_what_i
         assert len(distances_of(mask, most).border) == kept
     hidden = np.zeros_like(mask)
     hidden[35, 60] = hidden[32, 73] = 1
-    left = {(int(x), int(y)) for x, y in distances_of(mask, hidden=hidden).border}
+    left = {(int(x), int(y)) for x, y in distances_of(mask, unknown=hidden).border}
     gone = {(int(x), int(y)) for x, y in everything} - left
     assert gone == set()
     hidden[32, 72] = 1
     hidden[38, 60] = 1
-    left = {(int(x), int(y)) for x, y in distances_of(mask, hidden=hidden).border}
+    left = {(int(x), int(y)) for x, y in distances_of(mask, unknown=hidden).border}
     gone = {(int(x), int(y)) for x, y in everything} - left
     assert gone == {*((x, 39) for x in range(58, 63))}
     hidden[32, 71] = 1
-    left = {(int(x), int(y)) for x, y in distances_of(mask, hidden=hidden).border}
+    left = {(int(x), int(y)) for x, y in distances_of(mask, unknown=hidden).border}
     assert {(int(x), int(y)) for x, y in everything} - left - gone == {(69, y) for y in range(30, 35)}
 
 
@@ -200,14 +200,14 @@ def test_every_views_distances_are_kept_as_long_as_the_evidence() -> None:
     hidden[:, 36:58] = 255
     views = [
         ViewEvidence("a", np.zeros((61, 61, 3), np.uint8), disc(), disc()),
-        ViewEvidence("b", np.zeros((61, 61, 3), np.uint8), disc(), disc(), hidden=hidden),
+        ViewEvidence("b", np.zeros((61, 61, 3), np.uint8), disc(), disc(), unknown=hidden),
     ]
     evidence = FrameEvidence(3, tuple(views))
     exact, stepped = silhouette_distances(evidence, 20), silhouettes_by_camera(evidence, 20)
     for view, one in zip(views, exact, strict=True):
         for found, wanted in (
-            (one, distances_of(view.mask, 20, hidden=view.hidden)),
-            (stepped[view.camera], distances_of(view.mask, 20, exact=False, hidden=view.hidden)),
+            (one, distances_of(view.mask, 20, unknown=view.unknown)),
+            (stepped[view.camera], distances_of(view.mask, 20, exact=False, unknown=view.unknown)),
         ):
             np.testing.assert_array_equal(found.signed, wanted.signed)
             np.testing.assert_array_equal(found.border, wanted.border)

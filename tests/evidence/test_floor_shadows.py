@@ -7,6 +7,11 @@ from drawn_people import ring_of_cameras
 from toy_footage import looking_at
 
 from studio.evidence.floor_shadows import (
+    DENIED,
+    DOUBTED,
+    LIES_THERE,
+    SUBJECT,
+    UNKNOWN,
     Cells,
     FloorShadows,
     _drop_lesser_parts,
@@ -15,8 +20,8 @@ from studio.evidence.floor_shadows import (
     cells_of,
     lowest_changed,
     on_floor,
+    pixels_of,
     seen_at,
-    with_cells,
 )
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
@@ -32,6 +37,12 @@ def not_measured(kinds: np.ndarray, size: int) -> Cells:
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
     """(8, 3) corners, mm."""
     return np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+
+
+def with_cells(mask: np.ndarray, like: np.ndarray, chosen: np.ndarray, size: int) -> np.ndarray:
+    """A mask with what looks like a shadow in cells that are the subject's."""
+    grown = pixels_of(like, chosen == SUBJECT, size)
+    return mask if grown is None else mask | grown
 
 
 TRUNK = box((-150.0, -150.0, 0.0), (150.0, 150.0, 1700.0))
@@ -282,27 +293,32 @@ def cell_around(one: Cells, camera: Camera, place: np.ndarray) -> tuple[slice, s
 
 
 def plainly_explained(
-    cells: list[Cells], owner: int, place: np.ndarray, own: float, tolerance: float
-) -> bool:
-    denied, hidden = 0, 0
+    cells: list[Cells], owner: int, place: np.ndarray, own: float, tolerance: float, doubts: bool
+) -> int:
+    seen = []
     for number, (camera, one) in enumerate(zip(SMALL, cells, strict=True)):
         around = None if number == owner else cell_around(one, camera, place)
         if around is None:
             continue
         kinds, light = one.kinds[around], one.brightness[around]
         if own == 0.0:
-            if kinds.any():
-                return True
+            seen.append("shadow" if kinds.any() else "bare")
             continue
         like = kinds == 2
         if like.any():
             logs = np.log(light[like])
             if logs.min() - tolerance <= np.log(own) <= logs.max() + tolerance:
-                return True
-        middle = cell_middle(one, camera, place)
-        hidden += middle == 1
-        denied += middle != 1
-    return hidden > 0 and denied == 0
+                seen.append("shadow")
+                continue
+        seen.append("hidden" if cell_middle(one, camera, place) == 1 else "bare")
+    shadows, bare = seen.count("shadow"), seen.count("bare")
+    if own == 0.0 or not doubts:
+        return LIES_THERE if shadows or (seen and not bare) else DENIED
+    if shadows == 0:
+        return DOUBTED if seen and not bare else DENIED
+    if shadows == 1 and bare >= 2:
+        return DENIED
+    return LIES_THERE if shadows >= 2 or len(seen) == 1 else DOUBTED
 
 
 def cell_middle(one: Cells, camera: Camera, place: np.ndarray) -> int:
@@ -311,14 +327,17 @@ def cell_middle(one: Cells, camera: Camera, place: np.ndarray) -> int:
 
 
 @pytest.mark.parametrize("height", [0.0, 300.0])
-@pytest.mark.parametrize("known", [False, True])
+@pytest.mark.parametrize(("known", "doubts"), [(False, False), (True, False), (False, True), (True, True)])
 def test_the_floor_explains_a_cell_where_another_camera_sees_a_shadow_as_dark(
-    height: float, known: bool
+    height: float, known: bool, doubts: bool
 ) -> None:
-    """Or, where the cell's own brightness is not known, anything that changed."""
+    """Or, where the cell's own brightness is not known, anything that changed. Where doubts are asked for, one camera
+    of several is not enough to be certain, and two that see bare floor deny it.
+    """
     owners, rays = random_rays(300)
     rng = np.random.default_rng(9)
     own = rng.uniform(0.4, 1.0, 300).astype(np.float32) * known
+    told_apart: set[int] = set()
     for share in (0.1, 0.9):
         cells = [
             Cells(
@@ -333,14 +352,19 @@ def test_the_floor_explains_a_cell_where_another_camera_sees_a_shadow_as_dark(
         kinds, light = (
             np.concatenate([getattr(one, name).ravel() for one in cells]) for name in ("kinds", "brightness")
         )
-        explained = on_floor(kinds, light, _maps(cells), views_of(SMALL), owners, rays, own, 0.05, height)
+        explained = on_floor(
+            kinds, light, _maps(cells), views_of(SMALL), owners, rays, own, 0.05, height, doubts
+        )
         expected = []
         for owner, ray, mine in zip(owners, rays, own, strict=True):
             centre = SMALL[owner].centre
             place = centre + (height - centre[2]) / ray[2] * ray
-            expected.append(ray[2] < 0.0 and plainly_explained(cells, int(owner), place, float(mine), 0.05))
+            told = plainly_explained(cells, int(owner), place, float(mine), 0.05, doubts)
+            expected.append(told if ray[2] < 0.0 else DENIED)
         np.testing.assert_array_equal(explained, expected)
-        assert 5 < np.count_nonzero(expected) < 290
+        assert 2 < np.count_nonzero(expected) < 290
+        told_apart.update(expected)
+    assert told_apart == ({DENIED, DOUBTED, LIES_THERE} if known and doubts else {DENIED, LIES_THERE})
 
 
 LEG = box((-120.0, -120.0, 150.0), (120.0, 120.0, 500.0))
@@ -378,6 +402,44 @@ def test_a_leg_before_a_shadow_that_is_not_as_dark_is_the_subjects(alike: bool) 
     assert before < 0.05
     assert max(shadow, shadow_before) < 0.01
     assert leg < 0.05 if alike else leg > 0.75
+
+
+def test_what_one_camera_alone_confirms_is_unknown_where_something_above_the_floor_may_be_there() -> None:
+    """Two cameras see the shadow, and its place is hidden from the two others, which see what stands above it: of these
+    two each has one that confirms it, of four that see it each has three.
+    """
+    above = box((-200.0, -200.0, 250.0), (200.0, 200.0, 450.0))
+    things = [drawn(camera, above) for camera in CAMERAS]
+    floor = [drawn(camera, box((-1800.0, -1800.0, 0.0), (1800.0, 1800.0, 0.0))) for camera in CAMERAS]
+    shares = {}
+    for confirming in (2, 4):
+        seen = []
+        for number, (thing, shadow) in enumerate(zip(things, floor, strict=True)):
+            like = number < confirming
+            mask = np.zeros_like(thing) if like else thing | shadow
+            passing = thing | shadow if like else np.zeros_like(thing)
+            kinds = cells_of(mask, passing).kinds
+            seen.append(cells_of(mask, passing, np.where(kinds == 2, 0.6, 0.0).astype(np.float32)))
+        for doubts in (False, True):
+            cells = FloorShadows(CAMERAS).unexplained(seen, 0.1, doubts)[0]
+            own = cv2.resize(things[0], cells.shape[::-1], interpolation=cv2.INTER_AREA) > 127
+            assert not (cells[own] == SUBJECT).any()
+            shares[confirming, doubts] = float((cells[own] == UNKNOWN).mean())
+    assert shares[2, True] > 0.8
+    assert shares[2, False] == shares[4, False] == 0.0
+    assert shares[4, True] < 0.02
+
+
+def test_what_is_no_shadow_and_nothing_else_either_is_unknown() -> None:
+    """The other cameras see the floor there bare, and nothing above it."""
+    seen = [cells_of(drawn(camera, TRUNK), None) for camera in CAMERAS]
+    seen[0].kinds[200:230, 5:35], seen[0].brightness[200:230, 5:35] = 2, 0.6
+    patch = np.zeros_like(seen[0].kinds)
+    patch[200:230, 5:35] = UNKNOWN
+    known, doubted = (FloorShadows(CAMERAS).unexplained(seen, 0.1, doubts) for doubts in (False, True))
+    assert not any(one.any() for one in known)
+    np.testing.assert_array_equal(doubted[0], patch)
+    assert not any(one.any() for one in doubted[1:])
 
 
 def without(cells: Cells) -> Cells:

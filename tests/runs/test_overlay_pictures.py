@@ -1,5 +1,7 @@
 """Pictures with overlays: what is drawn lies where an independent projection puts it."""
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
@@ -91,6 +93,17 @@ def test_silhouettes_are_red_blue_and_yellow() -> None:
         expected = 0.5 * 90 + 0.5 * np.array(colour_tokens()[f"silhouette-{token}"][::-1])
         np.testing.assert_allclose(drawn[pixel], expected, atol=1.0)
     np.testing.assert_array_equal(drawn[10, 10], [90, 90, 90])
+
+
+def test_what_cannot_be_told_is_violet_inside_and_outside_the_model() -> None:
+    mask, unknown = np.zeros((HEIGHT, WIDTH), np.uint8), np.zeros((HEIGHT, WIDTH), np.uint8)
+    mask[50:100, 50:100], unknown[90:140, 50:140] = 255, 255
+    seen = dataclasses.replace(evidence(mask), unknown=unknown)
+    drawn = draw_view(seen, marks(square(75, 75, 50)), ("mask",), colour_tokens())
+    wanted = {(60, 60): "observed", (95, 95): "both", (95, 55): "observed", (110, 110): "unknown"}
+    for pixel, token in {**wanted, (135, 60): "unknown", (80, 110): "projected"}.items():
+        expected = 0.5 * 90 + 0.5 * np.array(colour_tokens()[f"silhouette-{token}"][::-1])
+        np.testing.assert_allclose(drawn[pixel], expected, atol=1.0)
 
 
 def test_the_filled_silhouette_has_the_squares_area() -> None:

@@ -37,6 +37,7 @@ const FIRST = [
   "mask_shadow_window",
   "mask_shadow_floor",
   "mask_shadow_alike",
+  "mask_shadow_doubt",
   "mask_opening",
   "mask_closing",
   "mask_keep_components",

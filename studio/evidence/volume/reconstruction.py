@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.frame_evidence import FrameEvidence, open_mask
 from studio.evidence.volume import hull_kernels as kernels
 from studio.evidence.volume import hull_octree as octree
 from studio.evidence.volume.chi_square import fitted_thresholds
@@ -146,7 +146,7 @@ class Reconstructor:
         picture = np.concatenate([view.picture.reshape(-1, 3) for view in evidence.views])
         backgrounds = tuple(view.background for view in evidence.views if view.background is not None)
         if len(backgrounds) < len(evidence.views):
-            return self._seen_masks([view.mask for view in evidence.views], picture)
+            return self._seen_masks([open_mask(view) for view in evidence.views], picture)
         # Of all pixels, in the order in which they lie in memory: that is quicker than of those alone that are needed.
         distances = np.empty(len(picture), dtype=np.float32)
         shares = np.float32(self.settings.hull_shadow), np.float32(self.settings.hull_deepest_shadow)

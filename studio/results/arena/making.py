@@ -111,7 +111,7 @@ def _maps(run: InspectedRun, number: int, settings: RunSettings) -> FrameMaps:
         run.body.name,
         body_text(run.body),
         source.cameras_in(number),
-        tuple(ViewMaps(view.mask, view.edges, view.hidden) for view in evidence.views),
+        tuple(ViewMaps(view.mask, view.edges, view.unknown) for view in evidence.views),
         weighting.name,
         knobs,
     )

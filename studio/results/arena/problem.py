@@ -52,11 +52,11 @@ MOST_REFUSED = 100
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewMaps:
-    """What a camera saw. mask, edges, hidden : (H, W) as in `ViewEvidence`."""
+    """What a camera saw. mask, edges, unknown : (H, W) as in `ViewEvidence`."""
 
     mask: Bytes
     edges: Bytes
-    hidden: Bytes | None = None
+    unknown: Bytes | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class FrameMaps:
         weighting = WEIGHTINGS[self.weighting]
         settings = changed(weighting.settings_type(), self.knobs)
         views = tuple(
-            ViewEvidence(camera.name, NO_PICTURE, view.mask, view.edges, None, view.hidden)
+            ViewEvidence(camera.name, NO_PICTURE, view.mask, view.edges, None, view.unknown)
             for camera, view in zip(self.cameras, self.views, strict=True)
         )
         prepared = weighting.prepare(self.model, self.cameras, settings)
@@ -99,7 +99,7 @@ class FrameMaps:
         for camera, view in zip(self.cameras, self.views, strict=True):
             known.update(repr((camera.name, camera.width, camera.height)).encode())
             numbers = (camera.matrix, camera.distortion, camera.rotation, camera.translation)
-            for array in (*numbers, view.mask, view.edges, view.hidden):
+            for array in (*numbers, view.mask, view.edges, view.unknown):
                 known.update(b"" if array is None else np.ascontiguousarray(array).tobytes())
         return known.digest()
 

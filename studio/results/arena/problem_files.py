@@ -157,7 +157,7 @@ def _arrays_of_frame(name: str, maps: FrameMaps) -> dict[str, NDArray[Any]]:
     for at, (camera, view) in enumerate(zip(maps.cameras, maps.views, strict=True)):
         parts = {part: getattr(camera, part) for part in CAMERA_PARTS}
         parts |= {"mask": view.mask, "edges": view.edges}
-        parts |= {} if view.hidden is None else {"hidden": view.hidden}
+        parts |= {} if view.unknown is None else {"hidden": view.unknown}
         arrays |= {f"{name}.{at}.{part}": np.ascontiguousarray(array) for part, array in parts.items()}
     return arrays
 

@@ -1,6 +1,7 @@
 """Draws evidence and projected body onto a camera's picture (OpenCV; pictures are BGR).
 
-Silhouettes are coloured as in the paper's figures: red observed only, blue projected only, yellow both.
+Silhouettes are coloured as in the paper's figures: red observed only, blue projected only, yellow both;
+violet where it cannot be told what is observed.
 Everything is drawn for pictures resized by `scale`; pixel (0, 0) is the centre of the top-left pixel at
 every scale.
 """
@@ -57,7 +58,7 @@ def draw_view(
     """(h, w, 3) BGR: the view's picture with the chosen layers of `OVERLAYS` over it, from the ground up."""
     picture = _resized(_three_channels(view.picture), scale)
     if "mask" in layers:
-        picture = _with_mask(picture, view.mask, marks.contours, tokens, scale)
+        picture = _with_mask(picture, view, marks.contours, tokens, scale)
     if "edges" in layers:
         strength = _resized(view.edges, scale)[:, :, None].astype(np.float32) / 255.0
         tint = np.array(_bgr(tokens["edge-map"]), dtype=np.float32)
@@ -126,16 +127,18 @@ def _resized(picture: Bytes, scale: float) -> Bytes:
 
 
 def _with_mask(
-    picture: Bytes, mask: Bytes, contours: tuple[Array, ...], tokens: ColourTokens, scale: float
+    picture: Bytes, view: ViewEvidence, contours: tuple[Array, ...], tokens: ColourTokens, scale: float
 ) -> Bytes:
-    observed = _resized(mask, scale) > 127
+    observed = _resized(view.mask, scale) > 127
+    unknown = np.zeros_like(observed) if view.unknown is None else _resized(view.unknown, scale) > 127
     height, width = picture.shape[:2]
     projected = projected_silhouette(contours, height, width, scale) > 0
     tint = picture.astype(np.float32)
     for region, token in (
         (observed & ~projected, "silhouette-observed"),
-        (projected & ~observed, "silhouette-projected"),
+        (projected & ~observed & ~unknown, "silhouette-projected"),
         (observed & projected, "silhouette-both"),
+        (unknown & ~observed, "silhouette-unknown"),
     ):
         tint[region] = (1.0 - _MASK_SHARE) * tint[region] + _MASK_SHARE * np.array(_bgr(tokens[token]))
     return np.round(tint).astype(np.uint8)

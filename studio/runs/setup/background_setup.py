@@ -626,7 +626,7 @@ class _Trying:
                 {camera.name: raw[frame, camera.name].unpacked() for camera in self._cameras}
             )
             yield [
-                reduced(maker.finished_mask(camera.name, seen[camera.name]), lens)
+                reduced(maker.finished(camera.name, seen[camera.name])[0], lens)
                 for camera, lens in zip(self._cameras, small, strict=True)
             ]
 

@@ -301,7 +301,7 @@ class _Masks:
                 seen = {camera.name: raw.pop((kind, frame, camera.name)).unpacked() for camera in cameras}
                 seen = maker.without_false_shadows(seen)
                 for number, (camera, lens) in enumerate(zip(cameras, self.lenses, strict=True)):
-                    mask = maker.finished_mask(camera.name, seen[camera.name])
+                    mask = maker.finished(camera.name, seen[camera.name])[0]
                     self._masks[kind, number, frame] = PackedMask(reduced(mask, lens))
 
     def of(self, kind: str, view: int, frame: int) -> Bytes:

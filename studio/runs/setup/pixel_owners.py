@@ -5,7 +5,7 @@ pixel's colour, and by how near that limb is; of limbs that hide one another the
 learnt of each limb in each camera where the body is alone, so that it does not matter that two have the same hair.
 
 What another body's pixels hide is no evidence against a body that stands behind: there its own silhouette stays in its
-mask, and where its mask says nothing of it is kept beside the mask (`ViewEvidence.hidden`). In front of the other it
+mask, and where its mask says nothing of it is kept beside the mask (`ViewEvidence.unknown`). In front of the other it
 would be seen: there it does not.
 """
 

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
-from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.frame_evidence import FrameEvidence, half_mask
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
@@ -236,4 +236,6 @@ class EdgeRegionFrameLikelihood(DeviceFrameLikelihood):
 def weighting_maps(evidence: FrameEvidence) -> Maps:
     """Edge and foreground maps of all views as 255 (1 - p)², p = value / 255."""
     table = np.round(WORST * (1.0 - np.arange(256) / 255.0) ** 2).astype(np.uint8)
-    return joined_maps([[(v.edges, table), (v.mask, table)] for v in evidence.views], (WORST, 0), np.uint8)
+    return joined_maps(
+        [[(v.edges, table), (half_mask(v), table)] for v in evidence.views], (WORST, 0), np.uint8
+    )

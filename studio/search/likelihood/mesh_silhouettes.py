@@ -6,7 +6,7 @@ import numpy as np
 
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
-from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.frame_evidence import FrameEvidence, half_mask
 from studio.foundations.arrays import Array, Floats, Mask
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.camera_table import camera_table, outward_limit
@@ -32,7 +32,7 @@ class MeshSilhouettes(BaseFrameLikelihood):
         self._body = body
         self._points, self._triangles, self._joints = all_meshes(body, COARSE)
         self._cameras = camera_table(cameras, outward_limit)
-        masks = [np.asarray(view.mask) >= FOREGROUND for view in evidence.views]
+        masks = [np.asarray(half_mask(view)) >= FOREGROUND for view in evidence.views]
         self._shrink = np.array([_shrink(mask) for mask in masks])
         small = [_shrunk(mask, factor) for mask, factor in zip(masks, self._shrink.tolist(), strict=True)]
         self._sizes = np.array([mask.shape for mask in small], dtype=np.int64)

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.frame_evidence import FrameEvidence, half_mask
 from studio.foundations.arrays import Array, Floats, Mask
 from studio.foundations.knobs import next_frame_knob
 from studio.foundations.numba_in_threads import parallel_blocks
@@ -63,7 +63,7 @@ class Silhouettes:
 
     def __init__(self, evidence: FrameEvidence, resolution: str = FULL) -> None:
         self.scale = 0.5 if resolution == HALF else 1.0
-        masks = [view.mask >= FOREGROUND for view in evidence.views]
+        masks = [half_mask(view) >= FOREGROUND for view in evidence.views]
         if resolution == HALF:
             masks = [halved(mask) for mask in masks]
         self.sizes = np.array([mask.shape[::-1] for mask in masks], dtype=np.int64)

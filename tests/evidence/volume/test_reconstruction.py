@@ -198,6 +198,23 @@ def test_areas_outside_a_picture_are_left_to_the_other_views(scene: Scene) -> No
     assert all_five.contains(scene.points[in_sight]).mean() >= 0.99
 
 
+def test_what_a_view_cannot_tell_does_not_carve(scene: Scene) -> None:
+    first, *others = scene.masks.views
+    lower = first.mask.copy()
+    lower[: first.mask.shape[0] // 2] = 0
+    told = reconstruct(scene.masks, scene.cameras, scene.box)
+    untold, carved = (
+        reconstruct(
+            FrameEvidence(0, (dataclasses.replace(first, mask=first.mask - lower, unknown=unknown), *others)),
+            scene.cameras,
+            scene.box,
+        )
+        for unknown in (lower, None)
+    )
+    np.testing.assert_array_equal(untold.centres, told.centres)
+    assert carved.volume() < 0.8 * told.volume()
+
+
 def test_nothing_seen_is_an_empty_hull(scene: Scene) -> None:
     views = tuple(dataclasses.replace(view, mask=np.zeros_like(view.mask)) for view in scene.masks.views)
     hull = reconstruct(FrameEvidence(0, views), scene.cameras, scene.box)

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.background import GaussianBackground, gaussian_from_frames
-from studio.evidence.floor_shadows import cells_of, floor_shadows, with_cells
-from studio.evidence.masks import cleaned, disc
+from studio.evidence.floor_shadows import cells_of, floor_shadows
+from studio.evidence.masks import disc
+from studio.evidence.pipeline import RawMask, finished, with_shadows_decided
 from studio.evidence.settings import EvidenceSettings
 from studio.footage.capture.pictures import read_picture
 from studio.footage.capture.video import VideoReader, measure_video
@@ -44,9 +45,10 @@ CHOICES: Mapping[str, Mapping[str, Any]] = {
     "5 pixels, 0.03": {"mask_shadow_colour": 0.03, **ALONE},
     "7 pixels, 0.025": {"mask_shadow_window": 7, **ALONE},
     "5 pixels, 0.025, on the floor": {"mask_shadow_alike": 0.0},
-    "5 pixels, 0.025, on the floor and as dark": {},
-    "5 pixels, 0.025, on the floor and as dark within 0.05": {"mask_shadow_alike": 0.05},
-    "5 pixels, 0.04, on the floor and as dark": {"mask_shadow_colour": 0.04},
+    "5 pixels, 0.025, on the floor and as dark": {"mask_shadow_doubt": False},
+    "5 pixels, 0.025, on the floor and as dark, or doubted": {},
+    "5 pixels, 0.025, on the floor and as dark within 0.05, or doubted": {"mask_shadow_alike": 0.05},
+    "5 pixels, 0.04, on the floor and as dark, or doubted": {"mask_shadow_colour": 0.04},
     "no shadow test": {"mask_shadow_test": False},
 }
 FRAMES, EMPTY_FRAMES = 5, 10
@@ -85,7 +87,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 @kept_as("open_questions.shadow_masks.measure")
 def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]:
     """Of every choice: pixels of the body called background; pixels beside it called body; the body's; pixels of its
-    shadow called body; the shadow's.
+    shadow called body; the shadow's; pixels of the body, and of its shadow, that are called neither.
     """
     clip = str(arguments["clip"])
     if clip.startswith(PREFIX):
@@ -96,26 +98,26 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
         if arguments["set"] == POOR:
             recipe = poorly_seen(recipe, arguments["worn"])
         cameras, frames = _drawn_frames(recipe, path.parent)
-    counted = {name: np.zeros(5, np.int64) for name in CHOICES}
+    counted = {name: np.zeros(7, np.int64) for name in CHOICES}
     tells = floor_shadows(cameras)
     for views in frames:
         parts = [(*_without_rim(truth), dark) for _, truth, dark, _ in views]
         for name, knobs in CHOICES.items():
             settings = dataclasses.replace(EvidenceSettings(), **knobs)
-            seen = [background.foreground(picture, settings) for picture, _, _, background in views]
-            masks: list[Bytes] = [one.mask for one in seen]
+            found = [background.foreground(picture, settings) for picture, _, _, background in views]
+            raw = {
+                camera.name: RawMask(one.mask, True, one.shadow, one.brightness)
+                for camera, one in zip(cameras, found, strict=True)
+            }
             if settings.mask_shadow_test and settings.mask_shadow_floor:
-                cells = [cells_of(*one) for one in seen]
-                masks = [
-                    with_cells(one.mask, one.shadow, chosen, own.size)
-                    for one, chosen, own in zip(
-                        seen, tells.unexplained(cells, settings.mask_shadow_alike), cells, strict=True
-                    )
-                ]
-            for mask, (body, beside, dark) in zip(masks, parts, strict=True):
-                final, shadow = cleaned(mask, settings) > 0, dark & beside
-                counts = body & ~final, beside & final, body, shadow & final, shadow
-                counted[name] += [one.sum() for one in counts]
+                seen = {camera.name: cells_of(*one) for camera, one in zip(cameras, found, strict=True)}
+                raw = with_shadows_decided(raw, seen, tells, settings)
+            for one, (body, beside, dark) in zip(raw.values(), parts, strict=True):
+                mask, unknown = finished(one, settings)
+                final, shadow = mask > 0, dark & beside
+                either = np.zeros_like(final) if unknown is None else unknown > 0
+                counts = body & ~(final | either), beside & final, body, shadow & final, shadow
+                counted[name] += [part.sum() for part in (*counts, body & either, shadow & either)]
     return {name: [int(value) for value in values] for name, values in counted.items()}
 
 
@@ -180,7 +182,7 @@ def _frames(video: Path, most: int) -> list[tuple[int, Bytes]]:
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """Of each choice and set of clips: share of the body called background, of the body's area called body beside it,
-    and of its shadow called body, mean and worst clip.
+    of its shadow called body, and of both called neither, mean and worst clip.
     """
     wrong = dict[str, dict[str, float]]()
     for kind in (PLAIN, OTHERS, POOR):
@@ -194,8 +196,10 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
             missed, added = 100.0 * counts[:, 0] / counts[:, 2], 100.0 * counts[:, 1] / counts[:, 2]
             shadow = 100.0 * counts[:, 3] / np.maximum(counts[:, 4], 1.0)
             shares = {"body called background": missed, "beside it called body": added}
+            shares["body called neither"] = 100.0 * counts[:, 5] / counts[:, 2]
             if kind != OTHERS:
                 shares["its shadow called body"] = shadow
+                shares["its shadow called neither"] = 100.0 * counts[:, 6] / np.maximum(counts[:, 4], 1.0)
             for what, values in shares.items():
                 yield number(f"{what}, {kind}, {choice}", [float(values.mean())], "%", better="lower")
                 yield number(
