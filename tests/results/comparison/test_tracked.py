@@ -164,7 +164,7 @@ def test_the_parts_of_an_error_add_up_and_leave_the_poses_as_they_are(cache) -> 
 
 def test_too_few_particles_are_the_searchs_fault_and_wrong_bones_the_bodys(cache) -> None:
     few = track(
-        attempt(changes={"layers": 1, "particles": 3}, last=2, sigma_scale=10.0, split_frames=1), cache
+        attempt(changes={"layers": 1, "particles": 3}, last=2, sigma_scale=3.0, split_frames=1), cache
     )
     assert max(few.parts_mm, key=few.parts_mm.get) == "search"
     bones = track(attempt(larger=0.15, last=2, split_frames=1), cache)

@@ -36,8 +36,14 @@ from studio.sessions.importers.importing import ImportOptions, import_source
 
 ELSEWHERE, FRAMES = {"wood": "drawn-elsewhere/wood", "tiles": "drawn-elsewhere/tiles"}, 75
 """Clips of others in the real data, and the frames of each."""
-EACH_PIXEL = {"mask_shadow_window": 1, "mask_shadow_colour": 0.04}
-"""The shadow test as it was: the colour of each pixel alone."""
+EACH_PIXEL = {
+    "mask_shadow_window": 1,
+    "mask_shadow_colour": 0.04,
+    "mask_shadow_floor": False,
+    "mask_shadow_alike": 0.0,
+    "mask_shadow_doubt": False,
+}
+"""The shadow test as it was: the colour of each pixel alone, each camera alone."""
 NARROW = {**EACH_PIXEL, "mask_shadow_colour": 0.015}
 TOGETHER: Mapping[str, Any] = {}
 """The default: the colour of neighbouring pixels together."""
