@@ -16,6 +16,7 @@ from studio.body.subject import Subject
 from studio.body.upright import LimbDrawing, limb_drawings
 from studio.foundations.arrays import Array
 from studio.foundations.declaring import Body, Model, OneOf, Seed, Terminal, Web, operation, taking
+from studio.foundations.errors import ExportError
 from studio.operations.opening import SessionName, keeping_in_place, open_session
 from studio.operations.progress import Reporting, reporting, say
 from studio.results.overlay_pictures import forget_composers
@@ -269,9 +270,13 @@ def landmarks(
     wrists, hips, knees and ankles of a person (of people only), off by some centimetres, and shifted against a body's
     own joints by as much: `studio evaluate --truth FILE` prints the error with and without that shift.
 
-    Raises FootageError where no two cameras see the same person.
+    Raises FootageError where no two cameras see the same person, ExportError for another kind of file.
     """
     opened, path = open_session(session), Path(to).absolute()
+    if path.suffix.lower() != ".trc":
+        raise ExportError(
+            f"'{path.name}' is not a name of a TRC file.", f"Call it '{path.with_suffix('.trc').name}'."
+        )
     check_writable(path.parent)
     with closing(opened.footage()) as footage, reporting(progress, f"{opened.name}: joints") as report:
         motion = person_landmarks(opened.cameras(), footage, report)

@@ -1,4 +1,4 @@
-"""`studio subjects`, `studio together`, `studio background --subject-at`."""
+"""`studio subjects`, `studio together`, `studio landmarks`, `studio background --subject-at`."""
 
 from pathlib import Path
 
@@ -41,6 +41,7 @@ def test_masks_of_several_are_said_to_be_so_and_cut(people: TwoPeople) -> None:
         (("background", "two", "--source", "subject"), "Nobody was chosen"),
         (("subjects", "two", "--at", "0.4"), "Write x and y"),
         (("subjects", "two", "--at", "9,9"), "Nobody stands at 9,9"),
+        (("landmarks", "two", "joints.csv"), "Call it 'joints.trc'"),
         (("together", "two"), "--beside"),
         (("together", "two", "--beside", "two"), "named twice"),
         (("together", "two", "--beside", "nowhere"), "no session 'nowhere'"),

@@ -112,6 +112,7 @@ export function MaskPictures({ shown, cameras, ...more }) {
         picture alone
       </${Check}>
     </div>
+    ${!shown.isBare.value && html`<p class="hint">Red: the subject. Violet: it cannot be told whether it is.</p>`}
     <div class=${shown.isCutting.value ? "pictures masks cutting" : "pictures masks"}>
       ${cameras.map(
         (camera) =>
