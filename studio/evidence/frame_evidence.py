@@ -24,6 +24,7 @@ class ViewEvidence:
     unknown : (H, W) uint8, 255 where it cannot be told whether a pixel is the body's: another subject is in front of
         it, or it looks like a shadow that too few cameras confirm; else 0. None: nowhere. Distances of silhouettes
         (`distance_maps`) leave it out, a hull is not carved by it (`open_mask`), likelihoods count it by `half_mask`.
+    shadow : (H, W) uint8, 255 where a pixel changed but passed for a shadow, whatever became of it. None: nowhere.
     """
 
     camera: str
@@ -32,6 +33,7 @@ class ViewEvidence:
     edges: Bytes
     background: YuvBackground | None = None
     unknown: Bytes | None = None
+    shadow: Bytes | None = None
 
 
 def half_mask(view: ViewEvidence) -> Bytes:

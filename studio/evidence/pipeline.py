@@ -153,7 +153,12 @@ class EvidenceMaker:
         with span("mask", frame):
             mask, unknown = self.finished(camera, raw)
         given = self._hidden(camera, frame)
-        return self.of_mask(camera, frame, mask, unknown if given is None else given)
+        view = self.of_mask(camera, frame, mask, unknown if given is None else given)
+        if raw.shadow is None:
+            return view
+        excluded = self._backgrounds.exclusion(camera)
+        shadow = raw.shadow if excluded is None else np.where(excluded > 0, np.uint8(0), raw.shadow)
+        return replace(view, shadow=shadow)
 
     def views(
         self, cameras: Sequence[str], frames: Sequence[int], progress: Callable[[int, int], None]

@@ -11,5 +11,5 @@ compiles what follows the first layer (`compiling_beside.py`).
 What a slider moved and no frame used yet lies in the run's `moved_knobs.json` (`moved_knobs.py`). What is tried of a
 frame and kept is a run of its own (`branching.py`): frames before it are copied, it is tracked again from the same
 start with the same random numbers. Several bodies at once share masks by limbs and their colours (`together.py`,
-`setup/pixel_owners.py`). `limbs_elsewhere.py` is a check's witness against a lost limb where the masks lack it.
+`setup/pixel_owners.py`).
 """

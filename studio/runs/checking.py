@@ -6,7 +6,6 @@ limbs (`jumps`), limbs contradicted by the masks (`search.trackers.agreement`), 
 """
 
 import contextlib
-import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -26,14 +25,20 @@ from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import counted
 from studio.runs.drawing.overlay_drawing import projected_silhouette
 from studio.runs.jumps import Jump, jumps_of
-from studio.runs.limbs_elsewhere import LimbsElsewhere, changed_pixels
 from studio.runs.refining import jitter
 from studio.runs.run_footage import filmed_cameras, footage_of
 from studio.runs.tracks import BEST, Track, read_track, track_stamp
 from studio.search.likelihood.overlay import limb_contours
 from studio.search.settings import RunSettings, settings_from_values
-from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.agreement import Agreement, Disagreement, without_bare
 from studio.search.trackers.hidden_areas import without_hidden
+from studio.search.trackers.limbs_elsewhere import (
+    Elsewhere,
+    LimbsElsewhere,
+    changes_by_camera,
+    lost_of,
+    none_missed,
+)
 from studio.search.trackers.loss_detection import anything_seen
 from studio.search.trackers.start_candidates import facing
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
@@ -59,7 +64,7 @@ NAMED = 4
 
 class ContradictedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A limb contradicted by a frame. share : of its area that disagrees with the masks. elsewhere : what changed in
-    the pictures contradicts it (`runs.limbs_elsewhere`), though the masks may not.
+    the pictures contradicts it (`search.trackers.limbs_elsewhere`), though the masks may not.
     """
 
     frame: int
@@ -186,33 +191,34 @@ def check_run(
     rows = range(0, len(chosen.frames), max(1, every))
     settings = _settings(run)
 
-    shares: list[tuple[tuple[float | None, ...], tuple[float | None, ...]]] = []
+    fits: list[tuple[tuple[float | None, ...], tuple[float | None, ...]]] = []
     contradicted, agreement = list[ContradictedLimb](), Agreement(body, cameras)
     with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
         known = set(results.frames())
         backgrounds, knobs = Backgrounds(footage), settings.evidence
         maker = EvidenceMaker(cameras, footage, backgrounds, knobs, "none")
-        plain = dataclasses.replace(knobs, mask_shadow_test=False)
-        with_shadows = EvidenceMaker(cameras, footage, backgrounds, plain, "none")
-        elsewhere = LimbsElsewhere(body, cameras)
+        witness = LimbsElsewhere(body, cameras)
         for done, row in enumerate(rows):
             progress("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))
             frame, pose = evidence.frame, chosen.poses[row]
-            shares.append(frame_shares(body, cameras, pose, evidence))
+            fits.append(frame_shares(body, cameras, pose, evidence))
             hidden: Mapping[str, Array] = results.result(frame).carried.memory if frame in known else {}
             off = _contradicted(agreement, pose, evidence, hidden)
             if off is not None:
-                changed = changed_pixels(evidence, with_shadows.evidence(frame))
-                contradicted += _with_elsewhere(frame, off, elsewhere.lost(pose, changed))
+                elsewhere = dict[str, Elsewhere]()
+                if witness.usable:
+                    elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
+                off = without_bare(off) if none_missed(elsewhere) else off
+                contradicted += _with_elsewhere(frame, off.shares(), lost_of(elsewhere))
     check = RunCheck(
         track=chosen.name,
         stamp=track_stamp(run, chosen.name),
         count=len(chosen.frames),
         cameras=tuple(camera.name for camera in cameras),
         frames=tuple(int(chosen.frames[row]) for row in rows),
-        inside=tuple(shown[0] for shown in shares),
-        covered=tuple(shown[1] for shown in shares),
+        inside=tuple(shown[0] for shown in fits),
+        covered=tuple(shown[1] for shown in fits),
         lost=_frames_where(chosen, np.isin(np.array(chosen.states), LOST)),
         doubtful=_frames_where(chosen, chosen.confidence < DOUBTFUL),
         turned=sudden_turns(body, chosen, run.record.fps),
@@ -261,15 +267,15 @@ def frame_shares(
 
 def _contradicted(
     agreement: Agreement, pose: Array, evidence: FrameEvidence, hidden: Mapping[str, Array]
-) -> dict[str, float] | None:
-    """By limb the share of its area that disagrees with a frame's masks, for a pose (D,); None where not all cameras
-    have one, or none shows anything. hidden : known occlusions by camera.
+) -> Disagreement | None:
+    """Where a pose (D,) disagrees with a frame's masks; None where not all cameras have one, or none shows anything.
+    hidden : known occlusions by camera.
     """
     if len(evidence.views) < len(agreement.cameras) or not anything_seen(evidence):
         return None
     mm = agreement.mm_per_pixel(pose)
     seen = without_hidden(silhouette_distances(evidence), agreement.cameras, mm, hidden)
-    return agreement.of(pose, seen).shares()
+    return agreement.of(pose, seen)
 
 
 def _with_elsewhere(frame: int, off: Mapping[str, float], lost: Sequence[str]) -> list[ContradictedLimb]:

@@ -35,6 +35,7 @@ from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_loop import search_frame
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
 from studio.search.trackers.hidden_areas import cell_size, counts_of
+from studio.search.trackers.limbs_elsewhere import changes_by_camera
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.settings import AnnealedSettings
 from studio.search.trackers.tracker import Estimate, FrameResult, start_of
@@ -64,7 +65,8 @@ def compile_for(_inbox: Connection, _outbox: Connection, session_folder: Path, r
     result = FrameResult(0, Estimate(pose, pose, pose, 0.0), 0, 0, 0, 0.0, start_of(tuple(pose.tolist())))
     settings = dataclasses.replace(FrameRefinementSettings(), redraw_limbs=False)
     silhouettes = partial(silhouettes_by_camera, evidence)
-    FrameRefiner(body, cameras, 0).refined(result, silhouettes, _Alike(), settings)
+    changes = partial(changes_by_camera, evidence)
+    FrameRefiner(body, cameras, 0).refined(result, silhouettes, _Alike(), settings, changes)
 
 
 def _compile_without_outlines(body: BodyModel, cameras: tuple[Camera, ...], pose: Array) -> None:

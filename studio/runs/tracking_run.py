@@ -34,6 +34,7 @@ from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_loop import FrameSearch, SearchState, held_over
 from studio.search.trackers.frame_refinement import FrameRefiner, space_after
 from studio.search.trackers.layer_record import search_notes
+from studio.search.trackers.limbs_elsewhere import changes_by_camera
 from studio.search.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord
 from studio.sessions.results_codec import particle_arrays, particles_from
 from studio.sessions.results_store import ResultsReader, ResultsWriter
@@ -286,7 +287,11 @@ class TrackingRun:
             evidence = self._seen.evidence(search.frame, held)
             with span("refine", search.frame):
                 result = self._refiner.refined(
-                    result, partial(silhouettes_by_camera, evidence), problem, settings.refinement
+                    result,
+                    partial(silhouettes_by_camera, evidence),
+                    problem,
+                    settings.refinement,
+                    partial(changes_by_camera, evidence),
                 )
         carried, for_lost = self.carried_into(search.frame), self._watch.searches_for_lost(search.frame)
         with span("conclude", search.frame):

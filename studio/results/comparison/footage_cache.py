@@ -120,4 +120,5 @@ class FootageCache:
 
 
 def _size(evidence: FrameEvidence) -> int:
-    return sum(view.mask.nbytes + view.edges.nbytes + view.picture.nbytes for view in evidence.views)
+    maps = [(view.mask, view.edges, view.picture, view.unknown, view.shadow) for view in evidence.views]
+    return sum(one.nbytes for of_view in maps for one in of_view if one is not None)

@@ -21,6 +21,7 @@ from studio.search.settings import RunSettings, changed_settings
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_loop import search_frame
 from studio.search.trackers.frame_refinement import FrameRefiner, space_after
+from studio.search.trackers.limbs_elsewhere import changes_by_camera
 from studio.search.trackers.tracker import FilterState, FrameLikelihood, FrameResult, start_of
 
 
@@ -97,6 +98,7 @@ class Retracking:
             lambda points: silhouettes_by_camera(evidence, points),
             self._problems[frame],
             settings.refinement,
+            lambda: changes_by_camera(evidence),
         )
 
 

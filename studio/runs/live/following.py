@@ -17,6 +17,7 @@ from studio.search.settings import RunSettings
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_loop import FrameSearch, search_together
 from studio.search.trackers.frame_refinement import FrameRefiner, space_after
+from studio.search.trackers.limbs_elsewhere import changes_by_camera
 from studio.search.trackers.tracker import FilterState, FrameLikelihood, FrameResult, LayerRecord, SearchSpace
 
 
@@ -77,7 +78,8 @@ class Following:
         settings, frame = self.settings, result.frame
         if self.refiner is not None and seen is not None:
             silhouettes = partial(silhouettes_by_camera, seen)
-            result = self.refiner.refined(result, silhouettes, problem, settings.refinement)
+            changes = partial(changes_by_camera, seen)
+            result = self.refiner.refined(result, silhouettes, problem, settings.refinement, changes)
         self.carried = result.carried
         self.poses.append(result.estimate.pose)
         self.log_weights.append(result.estimate.log_weight)

@@ -8,7 +8,7 @@ matter.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -97,6 +97,11 @@ class Agreement:
             add_limb_counts(own, points, view.signed, view.corner, view.size, step, FAR_MM / mm, counts)
             found += counts * (step * mm) ** 2
         return found
+
+
+def without_bare(off: Disagreement) -> Disagreement:
+    """The disagreement where no limb is missed: what it leaves bare is something else."""
+    return replace(off, bare=np.zeros_like(off.bare))
 
 
 def limb_names(body: BodyModel) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from studio.foundations.knobs import next_frame_knob
 from studio.search.trackers.agreement import Agreement, Disagreement
 from studio.search.trackers.hidden_areas import learnt, without_hidden
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
+from studio.search.trackers.limbs_elsewhere import Change, Elsewhere, LimbsElsewhere, lost_of, none_missed
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import Distances, RefinementSettings, Refiner
 from studio.search.trackers.tracker import (
@@ -114,18 +115,22 @@ class FrameRefiner:
         silhouettes_of: Callable[[int], Mapping[str, Distances]],
         problem: FrameLikelihood,
         settings: FrameRefinementSettings,
+        changes_of: Callable[[], Mapping[str, Change]] | None = None,
     ) -> FrameResult:
         """The result with its pose refined, and the next frame's start; unchanged where refinement is off or no mask
         shows anything.
 
-        silhouettes_of : the frame's silhouettes by camera, with at most so many border points each.
+        silhouettes_of : the frame's silhouettes by camera, with at most so many border points each. changes_of : what
+        changed in its pictures, by camera; None: silhouettes alone say which limbs are lost.
         """
         seen: Mapping[str, Distances] = (
             silhouettes_of(settings.refine_frame_points) if settings.refine_frames else {}
         )
         if not any(len(view.border) for view in seen.values()):
             return result
-        refiner, redrawing, agreement, certainty_of = self._prepared(tuple(seen), settings.refine_frame_steps)
+        refiner, redrawing, agreement, certainty_of, witness = self._prepared(
+            tuple(seen), settings.refine_frame_steps
+        )
         start, masks, memory = result.estimate.pose, tuple(seen.values()), result.carried.memory
         silhouettes = without_hidden(masks, agreement.cameras, agreement.mm_per_pixel(start), memory)
         ended, evaluations = refiner.refine(start, silhouettes), 0
@@ -144,6 +149,9 @@ class FrameRefiner:
         if matrix is None or pose is not ended.pose:
             matrix = refiner.loss(pose, silhouettes)[2]
         certainty = certainty_of.of(pose, matrix, memory)
+        elsewhere = dict[str, Elsewhere]()
+        if changes_of is not None and witness.usable:
+            elsewhere = witness.of(pose, tuple(changes_of().values()), memory)
         memory = {**learnt(memory, off, agreement.cameras, masks), **certainty.moved}
         return dataclasses.replace(
             result,
@@ -151,7 +159,7 @@ class FrameRefiner:
             carried=dataclasses.replace(carried, memory=memory),
             evaluations=result.evaluations + evaluations,
             disagreement=off.shares(),
-            limb_loss=certainty.lost(off),
+            limb_loss=certainty.lost(off, lost_of(elsewhere), none_missed(elsewhere)),
         )
 
     def _made_for(self, names: tuple[str, ...], steps: int) -> "_Prepared":
@@ -160,7 +168,13 @@ class FrameRefiner:
             Refiner(self._body, cameras, RefinementSettings(refinement_steps=most))
             for most in (steps, max(steps, REDRAWN_STEPS))
         )
-        return _Prepared(ending, redrawing, Agreement(self._body, cameras), CertaintyOfLimbs(ending))
+        return _Prepared(
+            ending,
+            redrawing,
+            Agreement(self._body, cameras),
+            CertaintyOfLimbs(ending),
+            LimbsElsewhere(self._body, cameras),
+        )
 
 
 class _Prepared(NamedTuple):
@@ -170,6 +184,7 @@ class _Prepared(NamedTuple):
     redrawing: Refiner
     agreement: Agreement
     certainty_of: CertaintyOfLimbs
+    witness: LimbsElsewhere
 
 
 @dataclass(frozen=True, slots=True, eq=False)

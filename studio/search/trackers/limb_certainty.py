@@ -32,7 +32,7 @@ The standard deviations rank limbs; they are not calibrated. Scaled so that 68 %
 a clothed body and the cones differ, which is the same in all frames of a clip.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,7 @@ import numpy as np
 from studio.body.forward_kinematics import limb_ends
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array
-from studio.search.trackers.agreement import LEAST_AREA, Disagreement, limb_names
+from studio.search.trackers.agreement import LEAST_AREA, Disagreement, limb_names, without_bare
 from studio.search.trackers.refinement import Refiner, rigid_limbs
 from studio.search.trackers.tracker import LIMB_LOST_SHARE, MOVED
 
@@ -57,6 +57,8 @@ DETERMINED_MM = 10.0
 MOST_OUTSIDE, LEAST_OUTSIDE, LEAST_BARE, JUMP_MM = 0.05, 0.005, 0.003, 100.0
 CONSTANT, WEIGHTS = 3.90, np.array([1.37, 0.44, 1.81])
 """Log-odds of a lost limb: of no sign, and per logarithm of outside, of bare, and of jump times that of deviation."""
+WITNESSED = 3.0
+"""Least log-odds of a limb that the pictures show in another place."""
 ENDS, JUMPS = f"{MOVED}ends", f"{MOVED}jumps"
 
 
@@ -72,10 +74,15 @@ class Certainty:
     jump: Array
     moved: Mapping[str, Array]
 
-    def lost(self, off: Disagreement) -> dict[str, float]:
-        """By limb the probability that it is lost. off : the pose's disagreement with the silhouettes."""
-        signs, bare = self.signs(off)
+    def lost(
+        self, off: Disagreement, elsewhere: Collection[str] = (), none_missed: bool = False
+    ) -> dict[str, float]:
+        """By limb the probability that it is lost. off : the pose's disagreement with the silhouettes. elsewhere :
+        limbs that the pictures show in another place. none_missed : whether what the pose leaves bare is no limb.
+        """
+        signs, bare = self.signs(without_bare(off) if none_missed else off)
         odds = np.where(bare > LIMB_LOST_SHARE, np.inf, CONSTANT + signs @ WEIGHTS)
+        odds = np.where([limb in elsewhere for limb in self.limbs], np.maximum(odds, WITNESSED), odds)
         return dict(zip(self.limbs, (1.0 / (1.0 + np.exp(-odds))).tolist(), strict=True))
 
     def signs(self, off: Disagreement) -> tuple[Array, Array]:

@@ -18,6 +18,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.runs.search_space import default_sigma, search_space
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner, space_after
+from studio.search.trackers.limbs_elsewhere import changes_by_camera
 from studio.search.trackers.refinement import RefinementSettings, Refiner, rigid_limbs
 from studio.search.trackers.tracker import (
     Estimate,
@@ -100,6 +101,28 @@ def test_a_lost_arm_is_resampled(body: BodyModel, truth: np.ndarray, refined) ->
     assert not found.limbs_lost
     assert off(body, found.estimate.pose, truth) < 0.5 * off(body, stuck.estimate.pose, truth)
     assert found.evaluations > stuck.evaluations
+
+
+def test_an_arm_that_only_the_pictures_show_is_named(
+    body: BodyModel, truth: np.ndarray, evidence: FrameEvidence, problem: FrameLikelihood
+) -> None:
+    names = [entry.name for entry in body.parameters]
+    pose = truth.copy()
+    pose[names.index("left_shoulder_rx")], pose[names.index("left_elbow_ry")] = -0.5, 0.0
+    folded = drawn_evidence(body, pose, CAMERAS)
+    seen = dataclasses.replace(
+        folded,
+        views=tuple(
+            dataclasses.replace(view, shadow=whole.mask & ~view.mask)
+            for view, whole in zip(folded.views, evidence.views, strict=True)
+        ),
+    )
+    refiner, silhouettes = FrameRefiner(body, CAMERAS, 7), partial(silhouettes_by_camera, seen)
+    alone = refiner.refined(searched(pose), silhouettes, problem, SETTINGS)
+    shown = refiner.refined(searched(pose), silhouettes, problem, SETTINGS, partial(changes_by_camera, seen))
+    assert alone.limbs_lost == ()
+    assert "left arm" in shown.limbs_lost
+    assert np.array_equal(alone.estimate.pose, shown.estimate.pose)
 
 
 @pytest.mark.parametrize(

@@ -70,3 +70,17 @@ def test_a_limb_that_jumped_is_doubted_for_some_frames_though_the_silhouettes_ag
     assert after[0]["left arm"] > 5.0 * after[0]["right leg"]
     assert after[2]["left arm"] > 2.0 * known
     assert after[-1]["left arm"] < 2.0 * known
+
+
+def test_the_pictures_have_a_say_in_what_is_lost(body: BodyModel) -> None:
+    aside, inside = standing(body, **ASIDE), standing(body, left_shoulder_rx=0.5, right_shoulder_rx=-0.2)
+    off = Agreement(body, CAMERAS).of(inside, silhouette_distances(drawn_evidence(body, aside, CAMERAS), 150))
+    found = certainty_and_lost(body, inside, inside)[0]
+    assert found.lost(off)["right arm"] == 1.0
+    assert found.lost(off, none_missed=True)["right arm"] < 1.0
+    sound = Agreement(body, CAMERAS).of(
+        aside, silhouette_distances(drawn_evidence(body, aside, CAMERAS), 150)
+    )
+    calm = certainty_and_lost(body, aside, aside)[0]
+    assert calm.lost(sound)["left arm"] < LIMB_LOST_PROBABILITY < calm.lost(sound, ("left arm",))["left arm"]
+    assert calm.lost(sound, ("left arm",))["right arm"] == calm.lost(sound)["right arm"]

@@ -12,7 +12,6 @@ long: no jump gives it away.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -38,11 +37,17 @@ from studio.results.comparison.tracked import Tracked, TrackingTrial, pose_on_tr
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.results.drawing_footage.real_data import PREFIX, real_data_folder
 from studio.results.evaluation.errors import limb_of_markers, lost_mm
-from studio.runs.limbs_elsewhere import LimbsElsewhere, changed_pixels
 from studio.runs.setup.shape_on_the_way import fit_session_shape
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, default_settings
-from studio.search.trackers.agreement import FAR_MM, Agreement, limb_names
+from studio.search.trackers.agreement import FAR_MM, Agreement, limb_names, without_bare
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
+from studio.search.trackers.limbs_elsewhere import (
+    Change,
+    LimbsElsewhere,
+    changes_by_camera,
+    lost_of,
+    none_missed,
+)
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.tracker import LIMB_LOST_PROBABILITY, LIMB_LOST_SHARE
@@ -127,15 +132,13 @@ def plant(
     whole, three = Looking(body, cameras), Looking(body, cameras[:3])
     for frame in evenly_spread(session.manifest.frame_count, frames):
         evidence = cache.evidence(session, cameras, int(frame), settings.evidence, "proximity")
-        plain = replace(settings.evidence, mask_shadow_test=False)
-        with_shadows = cache.evidence(session, cameras, int(frame), plain, "proximity")
-        changed = changed_pixels(evidence, with_shadows)
+        changed = tuple(changes_by_camera(evidence).values())
         seen = [distances_of(view.mask, POINTS) for view in evidence.views]
         truth = pose_on_truth(session, body, int(frame))
         pose = whole.refined(truth, seen)
         if lost_limbs(body, pose, truth):
             continue
-        yield SOUND, "", whole.named(pose, seen), whole.checked(pose, seen, changed)
+        yield SOUND, "", whole.named(pose, seen, changed), whole.checked(pose, seen, changed)
         rng = keyed_generator(seed, int(frame), 0, 0, KEY)
         for limb in whole.movable:
             draws = whole.drawn(rng, pose, limb)
@@ -154,7 +157,12 @@ def plant(
                     continue
                 ended = looking.refined(start, masks)
                 if limb in lost_limbs(body, ended, truth):
-                    yield cause, limb, looking.named(ended, masks), looking.checked(ended, masks, changed)
+                    yield (
+                        cause,
+                        limb,
+                        looking.named(ended, masks, changed),
+                        looking.checked(ended, masks, changed),
+                    )
 
 
 def lost_limbs(body: BodyModel, pose: Array, truth: Array) -> set[str]:
@@ -175,7 +183,7 @@ class Looking:
         self.body, self.cameras = body, cameras
         self._refiner = Refiner(body, cameras, RefinementSettings(refinement_steps=6))
         self._agreement, self._certainty = Agreement(body, cameras), CertaintyOfLimbs(self._refiner)
-        self._elsewhere = LimbsElsewhere(body, cameras)
+        self._witness = LimbsElsewhere(body, cameras)
 
     @property
     def movable(self) -> tuple[str, ...]:
@@ -204,22 +212,27 @@ class Looking:
         """(D,) a pose refined on the masks."""
         return self._refiner.refine(pose, seen).pose
 
-    def named(self, pose: Array, seen: Sequence[SilhouetteDistances]) -> tuple[str, ...]:
+    def named(
+        self, pose: Array, seen: Sequence[SilhouetteDistances], changed: Sequence[Change]
+    ) -> tuple[str, ...]:
         """The limbs that the detector calls lost, of a body that stood still for two frames."""
         matrix = self._refiner.loss(pose, seen)[2]
         certainty = self._certainty.of(pose, matrix, {})
         for _ in range(2):
             certainty = self._certainty.of(pose, matrix, certainty.moved)
-        lost = certainty.lost(self._agreement.of(pose, seen))
+        elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
+        lost = certainty.lost(self._agreement.of(pose, seen), lost_of(elsewhere), none_missed(elsewhere))
         return tuple(limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY)
 
     def checked(
-        self, pose: Array, seen: Sequence[SilhouetteDistances], changed: Sequence[Bytes]
+        self, pose: Array, seen: Sequence[SilhouetteDistances], changed: Sequence[Change]
     ) -> tuple[str, ...]:
         """The limbs that a check of the run calls contradicted. changed : as in `LimbsElsewhere.of`, of all cameras."""
-        shares = self._agreement.of(pose, seen).shares()
+        elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
+        off = self._agreement.of(pose, seen)
+        shares = (without_bare(off) if none_missed(elsewhere) else off).shares()
         denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
-        return (*denied, *self._elsewhere.lost(pose, changed[: len(self.cameras)]))
+        return (*denied, *lost_of(elsewhere))
 
     def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[Bytes]:
         """Each view's mask (H, W) without a limb of a pose, where no other limb of it lies."""
