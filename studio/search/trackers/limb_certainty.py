@@ -25,8 +25,8 @@ was chosen with each clip left out in turn. Frames named at LIMB_LOST_PROBABILIT
 Of the 44, which come of one seed, 34 of the 37 on *hard* are named, none of two on a walk and of five on a leap. The
 rule before named an arm before the trunk on two walks of that half, which was seen before this one was chosen.
 
-What changed in the pictures, also where the masks have it for a shadow, is another witness (`limbs_elsewhere`): it names
-limbs that no mask shows, and where it misses none what a pose leaves bare is something else.
+What changed in the pictures, also where masks have it for a shadow, is another witness (`limbs_elsewhere`). It names
+limbs that no mask shows; where it misses none what a pose leaves bare is something else.
 
 Tried without gain: the spread of the search's cloud, and how far the refinement moved the limb.
 
