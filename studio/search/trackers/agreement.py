@@ -3,8 +3,8 @@ that no limb covers.
 
 A limb that lies on another one covers nothing wrong; only the silhouette that it leaves uncovered shows the error. So
 both are counted in every view, beyond a distance that allows for clothes and rough masks, and assigned to the nearest
-limb. Everything is in mm² at a body of a person's size (`mm_at`), so that cameras, rates and the body's size do not
-matter.
+limb. Silhouette that no limb can reach (`reach`) is none of the body's: a hand's forearm, an arm's gripper, a shadow.
+Everything is in mm² at a body of a person's size (`mm_at`), so that cameras, rates and the body's size do not matter.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,14 @@ from studio.body.model import BodyModel, moving_joint
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.search.likelihood.outlines import OutlineProjector
-from studio.search.trackers.agreement_kernels import FIELDS, add_limb_counts, far_points, view_counts
+from studio.search.trackers.agreement_kernels import (
+    FIELDS,
+    add_limb_counts,
+    far_points,
+    nearest_limbs,
+    view_counts,
+)
+from studio.search.trackers.reach import reach_of
 from studio.search.trackers.refinement import Distances, mm_at
 
 FAR_MM = 45.0
@@ -27,12 +34,15 @@ GRID_MM = 14.0
 """mm, about: spacing of the points that are counted; at least a pixel."""
 COARSE_GRID_MM = 25.0
 """mm: the same where many positions of a limb are compared."""
+SOME_BARE = 0.01
+"""Share of a limb's area: where no limb leaves so much bare, it is not asked what limbs can reach."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Disagreement:
     """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
-    than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest.
+    than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb and within some limb's
+    reach, given to the nearest.
     limbs : (L,) name of the limb that each drawn one belongs to, from the body's parameters. corners : (V, L, 4, 2)
     pixels of the pose's outlines. mm : (V,) size of a pixel at the body.
     """
@@ -79,7 +89,29 @@ class Agreement:
             step = max(1, round(GRID_MM / mm))
             view_counts(quads, view.signed, view.corner, view.size, step, FAR_MM / mm, own)
             own *= (step * mm) ** 2
+        if (
+            counts[..., 2].sum(axis=0) > SOME_BARE * np.maximum(counts[..., 0].sum(axis=0), LEAST_AREA)
+        ).any():
+            counts[..., 2] -= self._beyond_reach(pose, corners, silhouettes, sizes)
         return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2], self._limbs, corners, sizes)
+
+    def _beyond_reach(
+        self, pose: Array, corners: Array, silhouettes: Sequence[Distances], sizes: Sequence[float]
+    ) -> Array:
+        """(V, L) mm² of bare silhouette that no limb of the body reaches, given to the nearest."""
+        steps = [max(1, round(GRID_MM / mm)) for mm in sizes]
+        bare = [
+            far_points(quads, view.signed, view.corner, step, FAR_MM / mm)
+            for quads, view, step, mm in zip(corners, silhouettes, steps, sizes, strict=True)
+        ]
+        beyond = reach_of(self.body).beyond(pose, self.cameras, silhouettes, bare, sizes, FAR_MM)
+        found = np.zeros(corners.shape[:2])
+        for own, quads, points, away, step, mm in zip(
+            found, corners, bare, beyond, steps, sizes, strict=True
+        ):
+            limbs = nearest_limbs(points[away], quads)
+            np.add.at(own, limbs[limbs >= 0], (step * mm) ** 2)
+        return found
 
     def of_places(self, poses: Array, silhouettes: Sequence[Distances], without: str | None = None) -> Array:
         """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from studio.foundations.arrays import Array, Floats
+from studio.foundations.arrays import Array, Floats, Indices
 from studio.foundations.numba_in_threads import EXACT, njit
 from studio.search.trackers.refinement_kernels import box_of, is_seen, turning
 
@@ -128,6 +128,25 @@ def far_points(
                 found[count, 0], found[count, 1] = x, y
                 count += 1
     return found[:count]
+
+
+@njit(**EXACT)
+def nearest_limbs(points: Array, quads: Array) -> Indices:
+    """(K,) the limb of quads (L, 4, 2) that is nearest to each point (K, 2), the first of those that are as near; -1
+    where none is seen.
+    """
+    turns, found = np.zeros(quads.shape[0]), np.full(points.shape[0], -1, np.int64)
+    for limb in range(quads.shape[0]):
+        turns[limb] = turning(quads[limb])
+    for k in range(points.shape[0]):
+        nearest = np.inf
+        for limb in range(quads.shape[0]):
+            if not np.isfinite(quads[limb, 0, 0]):
+                continue
+            distance = distance_to(points[k, 0], points[k, 1], quads[limb], turns[limb])
+            if distance < nearest:
+                found[k], nearest = limb, distance
+    return found
 
 
 @njit(**EXACT)

@@ -11,6 +11,7 @@ from studio.search.trackers.agreement_kernels import (
     is_inside,
     is_near,
     mark_near,
+    nearest_limbs,
     view_counts,
 )
 from studio.search.trackers.refinement_kernels import turning
@@ -121,6 +122,12 @@ def test_bare_silhouette_is_the_first_limbs_of_those_that_are_as_near() -> None:
         counts = np.zeros((2, 3))
         view_counts(order, signed, (0, 10), (60, 40), 1, FAR, counts)
         assert counts[:, 2].tolist() == [8.0, 7.0]
+
+
+def test_points_are_given_to_the_first_of_the_limbs_that_are_as_near() -> None:
+    points = grid((40, 44), 1).astype(float)
+    assert nearest_limbs(points, LIMBS).tolist() == distances(points, LIMBS).argmin(axis=1).tolist()
+    assert nearest_limbs(points, LIMBS[:1]).tolist() == [-1] * len(points)
 
 
 def test_where_no_limb_is_seen_nothing_is_bare() -> None:
