@@ -5,6 +5,7 @@ run or a frame annealed again gives the same result bit for bit.
 """
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -16,6 +17,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.geometry.camera import Camera
 from studio.runs.setup.initialising import hull_of, seek, whole_problem
 from studio.search.likelihood.catalogue import WEIGHTINGS, LossLimit
+from studio.search.likelihood.mesh_silhouettes import MeshSilhouettes
 from studio.search.settings import RunSettings, default_settings
 from studio.search.trackers.initialisation import PER_FAMILY, QUICK
 from studio.search.trackers.loss_detection import Onlooker, WeightWatch, anything_seen
@@ -149,7 +151,7 @@ class RunWatch:
             before = dataclasses.replace(before, state=TRACKED, doubts=0)
         if not sight.seen:
             return _hold(result, carried)
-        watch = before.watch if before.weighed == _weighting_of(settings) else _watch(settings)
+        watch = before.watch if before.weighed == _weighting_of(settings) else self._new_watch(settings)
         if not watch.is_lost(result.estimate.log_weight, sight):
             back = for_lost or before.state in (LOST, NO_EVIDENCE)
             state = RECOVERED if back else LIMB_LOST if result.limbs_lost else TRACKED
@@ -197,11 +199,14 @@ class RunWatch:
     ) -> None:
         settings = self._settings_in(frame)
         if standing.weighed != _weighting_of(settings):
-            standing.watch, standing.weighed = _watch(settings), _weighting_of(settings)
+            standing.watch, standing.weighed = self._new_watch(settings), _weighting_of(settings)
         if state in (TRACKED, RECOVERED) and not misses:
             standing.watch.well_tracked(log_weight, overlap)
         standing.streak = standing.streak + 1 if state == standing.state else 1
         standing.state, standing.doubts = state, misses
+
+    def _new_watch(self, settings: RunSettings) -> WeightWatch:
+        return _watch(settings, meshes=self._problems is not None and bool(self._problems.body.meshes))
 
     def _is_due(self, frame: int, settings: RunSettings) -> bool:
         """Whether to search for the body: at once when lost, then at intervals; and after a time without evidence."""
@@ -227,7 +232,11 @@ class RunWatch:
         cameras = tuple(camera for camera in self._problems.cameras if camera.name in seeing)
         hull, box, _ = hull_of(body, cameras, masks)
         prototypes = None if space.behaviour is None else space.behaviour.prototypes.poses
-        problem = whole_problem(body, cameras, _seeking(settings), masks)
+        problem = (
+            MeshSilhouettes(body, cameras, masks)
+            if body.meshes
+            else whole_problem(body, cameras, _seeking(settings), masks)
+        )
         seed = int(np.random.SeedSequence((self._seed, frame)).generate_state(1)[0])
         if settings.recovery.recovery != INITIALISE:
             rng = np.random.default_rng(seed)
@@ -259,8 +268,12 @@ def _seeking(settings: RunSettings) -> RunSettings:
     )
 
 
-def _watch(settings: RunSettings) -> WeightWatch:
-    return WeightWatch(WEIGHTINGS[settings.weighting_name].loss)
+BY_OVERLAP = LossLimit(spreads=math.inf)
+"""Of a body with meshes (`loss_detection`)."""
+
+
+def _watch(settings: RunSettings, *, meshes: bool) -> WeightWatch:
+    return WeightWatch(BY_OVERLAP if meshes else WEIGHTINGS[settings.weighting_name].loss)
 
 
 def _weighting_of(settings: RunSettings) -> tuple[object, ...]:

@@ -27,18 +27,29 @@ FOREGROUND = 128
 class MeshSilhouettes(BaseFrameLikelihood):
     """One frame. No likelihood of a run: it is a hundred times slower than those of cones."""
 
-    def __init__(self, body: BodyModel, cameras: Sequence[Camera], evidence: FrameEvidence) -> None:
+    def __init__(
+        self, body: BodyModel, cameras: Sequence[Camera], evidence: FrameEvidence | Sequence[Mask]
+    ) -> None:
+        """evidence : a frame's, or its masks (H, W)."""
         self.priors = HardPriors(body)
         self._body = body
         self._points, self._triangles, self._joints = all_meshes(body, COARSE)
         self._cameras = camera_table(cameras, outward_limit)
-        masks = [np.asarray(half_mask(view)) >= FOREGROUND for view in evidence.views]
+        masks = (
+            [np.asarray(half_mask(view)) >= FOREGROUND for view in evidence.views]
+            if isinstance(evidence, FrameEvidence)
+            else evidence
+        )
         self._shrink = np.array([_shrink(mask) for mask in masks])
         small = [_shrunk(mask, factor) for mask, factor in zip(masks, self._shrink.tolist(), strict=True)]
         self._sizes = np.array([mask.shape for mask in small], dtype=np.int64)
         self._masks = np.concatenate([mask.ravel() for mask in small])
 
     def log_likelihood(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        return -STEEPNESS * len(self._cameras) * self.wrong(poses)
+
+    def wrong(self, poses: Array) -> Array:
+        """(N,) the share of the masks' area by which the silhouettes of poses (N, D) differ from them."""
         wrong = np.zeros(len(poses))
         compare_silhouettes(
             joint_frames(self._body, poses),
@@ -51,7 +62,7 @@ class MeshSilhouettes(BaseFrameLikelihood):
             self._sizes,
             wrong,
         )
-        return -STEEPNESS * len(self._cameras) * wrong
+        return wrong
 
 
 def _shrink(mask: Mask) -> int:

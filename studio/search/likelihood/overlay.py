@@ -18,6 +18,7 @@ from studio.search.likelihood.bodytrack_kernels import EDGE_STEP, INSIDE_STEP, L
 from studio.search.likelihood.edge_region import EdgeRegionSettings
 from studio.search.likelihood.edge_region_kernels import CHUNK, FIRST_STRIP, SECOND_STRIP, THIRD_STRIP
 from studio.search.likelihood.edge_silhouette import EdgeSilhouetteSettings
+from studio.search.likelihood.mesh_outlines import MeshOutlines
 from studio.search.likelihood.outlines import OutlineProjector
 from studio.search.likelihood.visible_edges import body_edges, hidden_samples, limb_sides
 
@@ -33,9 +34,10 @@ class ViewOverlay:
     """One camera's view of one pose, pixels. L drawn limbs.
 
     camera : its name. limbs : L names. outlines : (L, 4, 2) corners A0, A1, B1, B0, NaN for a limb that is
-    not seen. contours : L closed polylines (K, 2), sides and the half ellipses at both ends; (0, 2) for a
-    limb that is not seen. edge_samples, region_samples : (K, 2) points inside the picture that the likelihood
-    reads, before they are rounded to the nearest pixel; none for the template, which reads all pixels."""
+    not seen. contours : L closed polylines (K, 2), sides and the half ellipses at both ends, or of a body with
+    meshes the outlines of the links that limbs stand for; (0, 2) for a limb that is not seen. edge_samples,
+    region_samples : (K, 2) points inside the picture that the likelihood reads, before they are rounded to the
+    nearest pixel; none for the template, which reads all pixels."""
 
     camera: str
     limbs: tuple[str, ...]
@@ -51,9 +53,7 @@ def limb_contours(body: BodyModel, cameras: tuple[Camera, ...], pose: Array) -> 
     """
     pose = np.asarray(pose, dtype=np.float64)
     corners = OutlineProjector.of_body(body, cameras).corners(pose[None])[0][0]
-    return tuple(
-        _contours(body, camera, pose, outlines) for camera, outlines in zip(cameras, corners, strict=True)
-    )
+    return _contours_by_view(body, cameras, pose, corners)
 
 
 def overlay_points(
@@ -72,16 +72,13 @@ def overlay_points(
     lines, visible = _edges_read(body, projector, pose, settings)
     names = tuple(limb.name for limb in body.drawn)
     found: list[ViewOverlay] = []
+    shown = _contours_by_view(body, cameras, pose, corners[0])
     for view, (camera, outlines, state) in enumerate(zip(cameras, corners[0], seen[0], strict=True)):
         edge, region = sample_points(outlines[state >= 0], settings)
         if lines is not None:
             edge = _on_lines(outlines, lines, visible[view] & (state[lines[:, 0], None] >= 0))
-        contours = _contours(body, camera, pose, outlines)
-        found.append(
-            ViewOverlay(
-                camera.name, names, outlines, contours, _inside(camera, edge), _inside(camera, region)
-            )
-        )
+        points = _inside(camera, edge), _inside(camera, region)
+        found.append(ViewOverlay(camera.name, names, outlines, shown[view], *points))
     return tuple(found)
 
 
@@ -155,6 +152,18 @@ def _inside(camera: Camera, points: Array) -> Array:
     """The points whose nearest pixel exists."""
     low = (points >= -0.5).all(axis=1)
     return points[low & (points < np.array([camera.width, camera.height]) - 0.5).all(axis=1)]
+
+
+def _contours_by_view(
+    body: BodyModel, cameras: tuple[Camera, ...], pose: Array, corners: Array
+) -> tuple[tuple[Array, ...], ...]:
+    """For each camera the contours of the limbs of a pose (D,). corners : (V, L, 4, 2) of their cones."""
+    if not body.meshes:
+        return tuple(
+            _contours(body, camera, pose, outlines) for camera, outlines in zip(cameras, corners, strict=True)
+        )
+    meshes = MeshOutlines(body, cameras)
+    return tuple(meshes.contours(pose, view) for view in range(len(cameras)))
 
 
 def _contours(body: BodyModel, camera: Camera, pose: Array, outlines: Array) -> tuple[Array, ...]:

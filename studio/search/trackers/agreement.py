@@ -7,13 +7,14 @@ limb. Silhouette that no limb can reach (`reach`) is none of the body's: a hand'
 Everything is in mm² at a body of a person's size (`mm_at`), so that cameras, rates and the body's size do not matter.
 """
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from studio.body.model import BodyModel, moving_joint
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, Indices, Mask
 from studio.foundations.geometry.camera import Camera
 from studio.search.likelihood.outlines import OutlineProjector
 from studio.search.trackers.agreement_kernels import (
@@ -23,6 +24,7 @@ from studio.search.trackers.agreement_kernels import (
     nearest_limbs,
     view_counts,
 )
+from studio.search.trackers.mesh_agreement import MeshAgreement
 from studio.search.trackers.reach import reach_of
 from studio.search.trackers.refinement import Distances, mm_at
 
@@ -42,9 +44,10 @@ SOME_BARE = 0.01
 class Disagreement:
     """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
     than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb and within some limb's
-    reach, given to the nearest.
-    limbs : (L,) name of the limb that each drawn one belongs to, from the body's parameters. corners : (V, L, 4, 2)
-    pixels of the pose's outlines. mm : (V,) size of a pixel at the body.
+    reach, given to the nearest. limbs : (L,) name of the limb that each drawn one belongs to, from the body's
+    parameters. corners : (V, L, 4, 2) pixels of the pose's outlines. mm : (V,) size of a pixel at the body. covered :
+    of a body with meshes, for a view and a number of pixels, whether a link lies on the middle of a cell of that size
+    (H, W).
     """
 
     area: Array
@@ -53,6 +56,7 @@ class Disagreement:
     limbs: tuple[str, ...]
     corners: Array
     mm: Sequence[float]
+    covered: Callable[[int, int], Mask] | None = None
 
     def shares(self) -> dict[str, float]:
         """Disagreeing area by limb (named as in the body's parameters), as a share of the limb's area."""
@@ -72,6 +76,7 @@ class Agreement:
         self.body, self.cameras = body, cameras
         self._limbs = limb_names(body)
         self._projector = OutlineProjector.of_body(body, cameras)
+        self._meshes = MeshAgreement(body, cameras) if body.meshes else None
 
     def corners(self, pose: Array) -> Array:
         """(V, L, 4, 2) pixels of the outlines of a pose (D,)."""
@@ -84,40 +89,36 @@ class Agreement:
     def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
         """Where a pose (D,) and a frame's silhouettes, one a camera, disagree."""
         corners, sizes = self.corners(pose), self.mm_per_pixel(pose)
-        counts: Array = np.zeros((*corners.shape[:2], FIELDS))
-        for own, quads, view, mm in zip(counts, corners, silhouettes, sizes, strict=True):
-            step = max(1, round(GRID_MM / mm))
-            view_counts(quads, view.signed, view.corner, view.size, step, FAR_MM / mm, own)
+        steps, far = [max(1, round(GRID_MM / mm)) for mm in sizes], [FAR_MM / mm for mm in sizes]
+        bare, covered = None, None
+        if self._meshes is not None:
+            counts, bare = self._meshes.counts(pose, silhouettes, steps, far)
+            covered = functools.partial(self._meshes.covered, pose)
+        else:
+            counts: Array = np.zeros((*corners.shape[:2], FIELDS))
+            for own, quads, view, step, reach in zip(counts, corners, silhouettes, steps, far, strict=True):
+                view_counts(quads, view.signed, view.corner, view.size, step, reach, own)
+        for own, step, mm in zip(counts, steps, sizes, strict=True):
             own *= (step * mm) ** 2
         if (
             counts[..., 2].sum(axis=0) > SOME_BARE * np.maximum(counts[..., 0].sum(axis=0), LEAST_AREA)
         ).any():
-            counts[..., 2] -= self._beyond_reach(pose, corners, silhouettes, sizes)
-        return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2], self._limbs, corners, sizes)
-
-    def _beyond_reach(
-        self, pose: Array, corners: Array, silhouettes: Sequence[Distances], sizes: Sequence[float]
-    ) -> Array:
-        """(V, L) mm² of bare silhouette that no limb of the body reaches, given to the nearest."""
-        steps = [max(1, round(GRID_MM / mm)) for mm in sizes]
-        bare = [
-            far_points(quads, view.signed, view.corner, step, FAR_MM / mm)
-            for quads, view, step, mm in zip(corners, silhouettes, steps, sizes, strict=True)
-        ]
-        beyond = reach_of(self.body).beyond(pose, self.cameras, silhouettes, bare, sizes, FAR_MM)
-        found = np.zeros(corners.shape[:2])
-        for own, quads, points, away, step, mm in zip(
-            found, corners, bare, beyond, steps, sizes, strict=True
-        ):
-            limbs = nearest_limbs(points[away], quads)
-            np.add.at(own, limbs[limbs >= 0], (step * mm) ** 2)
-        return found
+            bare = bare or _bare_points(corners, silhouettes, steps, far)
+            points = [places for places, _ in bare]
+            away = reach_of(self.body).beyond(pose, self.cameras, silhouettes, points, sizes, FAR_MM)
+            for own, (_, limbs), beyond, step, mm in zip(counts, bare, away, steps, sizes, strict=True):
+                np.subtract.at(own[:, 2], limbs[beyond], (step * mm) ** 2)
+        return Disagreement(
+            counts[..., 0], counts[..., 1], counts[..., 2], self._limbs, corners, sizes, covered
+        )
 
     def of_places(self, poses: Array, silhouettes: Sequence[Distances], without: str | None = None) -> Array:
         """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a
         coarse grid: what these limbs cover outside, and silhouette far from all limbs. without : a limb to leave
-        out.
+        out, if the body has no meshes.
         """
+        if self._meshes is not None:
+            return self._meshes.of_places(poses, silhouettes, self.mm_per_pixel(poses[0]))
         corners, _ = self._projector.corners(poses)
         corners[:, :, [limb == without for limb in self._limbs]] = np.nan
         moving = (corners != corners[:1]).any(axis=(0, 1, 3, 4))
@@ -134,6 +135,20 @@ class Agreement:
 def without_bare(off: Disagreement) -> Disagreement:
     """The disagreement where no limb is missed: what it leaves bare is something else."""
     return replace(off, bare=np.zeros_like(off.bare))
+
+
+def _bare_points(
+    corners: Array, silhouettes: Sequence[Distances], steps: Sequence[int], far: Sequence[float]
+) -> list[tuple[Array, Indices]]:
+    """Of every view the grid's points (K, 2) that are farther than `far` pixels from every limb of corners
+    (V, L, 4, 2), with the nearest limb (K,).
+    """
+    found = list[tuple[Array, Indices]]()
+    for quads, view, step, reach in zip(corners, silhouettes, steps, far, strict=True):
+        points = far_points(quads, view.signed, view.corner, step, reach)
+        limbs = nearest_limbs(points, quads)
+        found.append((points[limbs >= 0], limbs[limbs >= 0]))
+    return found
 
 
 def limb_names(body: BodyModel) -> tuple[str, ...]:

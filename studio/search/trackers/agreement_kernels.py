@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from studio.foundations.arrays import Array, Floats, Indices
+from studio.foundations.arrays import Array, Floats, Indices, Mask
 from studio.foundations.numba_in_threads import EXACT, njit
 from studio.search.trackers.refinement_kernels import box_of, is_seen, turning
 
@@ -243,8 +243,6 @@ def count_cells(
     """Update one view's counts (H, W): add 1 to cells whose middle a limb of quads covers farther than `far` pixels
     from the silhouette, set cells that show silhouette to 0.
     """
-    left, top = corner
-    height, width = signed.shape
     covered = np.zeros(counts.shape, np.bool_)
     for limb in range(quads.shape[0]):
         quad = quads[limb]
@@ -258,6 +256,21 @@ def count_cells(
             for column in range(max(0, int(lowest_x // cell)), int(last_column) + 1):
                 x, y = column * cell + cell // 2, row * cell + cell // 2
                 covered[row, column] |= is_inside(x, y, quad, turn)
+    count_covered(covered, signed, corner, cell, far, counts)
+
+
+@njit(**EXACT)
+def count_covered(
+    covered: Mask,
+    signed: Floats,
+    corner: tuple[int, int],
+    cell: int,
+    far: float,
+    counts: Array,
+) -> None:
+    """The same of cells (H, W) whose middle is covered."""
+    left, top = corner
+    height, width = signed.shape
     for row in range(counts.shape[0]):
         for column in range(counts.shape[1]):
             x, y = column * cell + cell // 2 - left, row * cell + cell // 2 - top

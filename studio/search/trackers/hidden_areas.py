@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import FAR_MM, Disagreement
-from studio.search.trackers.agreement_kernels import count_cells
+from studio.search.trackers.agreement_kernels import count_cells, count_covered
 from studio.search.trackers.refinement import Distances
 from studio.search.trackers.tracker import HIDDEN
 
@@ -116,8 +116,12 @@ def learnt(
         return memory
     found = dict(memory)
     views = zip(cameras, disagreement.corners, masks, disagreement.mm, strict=True)
-    for camera, quads, view, scale in views:
-        counts = counts_of(memory, camera).copy()
-        count_cells(quads, view.signed, view.corner, cell_size(camera), FAR_MM / scale, counts)
+    for number, (camera, quads, view, scale) in enumerate(views):
+        counts, cell = counts_of(memory, camera).copy(), cell_size(camera)
+        given = view.signed, view.corner, cell, FAR_MM / scale, counts
+        if disagreement.covered is None:
+            count_cells(quads, *given)
+        else:
+            count_covered(disagreement.covered(number, cell), *given)
         found[HIDDEN + camera.name] = counts
     return found
