@@ -202,7 +202,9 @@ def _closed_lines(inside: Mask) -> list[Array]:
                 if not line or line[-1] != (px, py):
                     line.append((px, py))
                 at = bx, by
-            lines.append(np.array([*line, line[0]], dtype=np.float64) + corner - 1.0)
+            if len(line) == 1 or line[-1] != line[0]:
+                line.append(line[0])
+            lines.append(np.array(line, dtype=np.float64) + corner - 1.0)
     return lines
 
 
