@@ -30,9 +30,10 @@ def limbs_put_right(
     seed: int,
     *,
     draw: bool = True,
+    turn: bool = True,
 ) -> Hypothesis:
     """The pose (D,) with its limbs corrected to a frame's masks, and what still disagrees. draw : whether limbs may be
-    redrawn; else the pose is unchanged.
+    redrawn; else the pose is unchanged. turn : whether a body with a lost tail may be turned round (`redrawn`).
     """
     refiner = Refiner(body, cameras, RefinementSettings())
     frame = SeenFrame(refiner, Agreement(body, cameras), silhouette_distances(evidence))
@@ -41,5 +42,5 @@ def limbs_put_right(
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0x11B5)))
     best = frame.hypothesis(refiner.refine(within_limits(body, pose), frame.silhouettes).pose)
     for _ in range(ROUNDS):
-        best, _ = redrawn(rng, best, frame)
+        best, _ = redrawn(rng, best, frame, turn=turn)
     return best

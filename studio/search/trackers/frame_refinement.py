@@ -235,10 +235,15 @@ class SeenFrame:
 
 
 def redrawn(
-    rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, last: Array | None = None
+    rng: np.random.Generator,
+    found: Hypothesis,
+    frame: SeenFrame,
+    last: Array | None = None,
+    *,
+    turn: bool = True,
 ) -> tuple[Hypothesis, int]:
     """The hypothesis with its doubtful limbs resampled, and the number of poses compared. last : (D,) pose of the last
-    frame, which is tried as well.
+    frame, which is tried as well. turn : whether a body whose tail is lost may be turned round.
     """
     evaluations, tried, began_with = 0, set[str](), found
     if last is not None:
@@ -255,7 +260,7 @@ def redrawn(
             drawn, weighed = drawn_along(rng, frame, found.pose, own)
             found = frame.best_of(found, drawn, own, BETTER_CHAIN)
             evaluations += weighed
-            if found.off.shares()[limb] > LIMB_LOST_SHARE:
+            if turn and found.off.shares()[limb] > LIMB_LOST_SHARE:
                 found, weighed = _turned_round(rng, found, frame, own)
                 evaluations += weighed
         elif len(own) > 1:
