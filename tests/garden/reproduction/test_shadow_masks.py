@@ -13,7 +13,7 @@ EXPERIMENT = EXPERIMENTS["shadow-test"]
 
 
 def test_shares_are_of_the_body_or_of_its_shadow_by_set() -> None:
-    counted = {"one": [10, 20, 1000, 5, 500], "other": [50, 0, 1000, 0, 250]}
+    counted = {"one": [10, 20, 1000, 5, 500, 30, 10], "other": [50, 0, 1000, 0, 250, 10, 0]}
     outcomes = [
         Outcome(Trial(f"{clip}, {kind}", {"clip": clip, "set": kind}), dict.fromkeys(CHOICES, counts))
         for kind, clips in ((PLAIN, ("one", "other")), (POOR, ("other",)))
@@ -27,6 +27,8 @@ def test_shares_are_of_the_body_or_of_its_shadow_by_set() -> None:
     assert numbers[f"body called background, worst clip, {PLAIN}, {choice}"] == pytest.approx(5.0)
     assert numbers[f"beside it called body, {PLAIN}, {choice}"] == pytest.approx(1.0)
     assert numbers[f"its shadow called body, {PLAIN}, {choice}"] == pytest.approx(0.5)
+    assert numbers[f"body called neither, {PLAIN}, {choice}"] == pytest.approx(2.0)
+    assert numbers[f"its shadow called neither, {PLAIN}, {choice}"] == pytest.approx(1.0)
     assert numbers[f"body called background, {POOR}, {choice}"] == pytest.approx(5.0)
     assert findings.tables[0].rows[0][1:] == ("1.0 / 2.0", "5.0 / 0.0")
 
