@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.evidence.floor_shadows import cell_size
+from studio.evidence.cells import cell_size
 from studio.evidence.settings import EvidenceSettings
 from studio.foundations.arrays import Bytes, Floats
 from studio.foundations.numba_in_threads import EXACT, KERNEL, njit

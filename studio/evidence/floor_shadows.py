@@ -21,13 +21,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.evidence.volume.hull_projection import distorted
+from studio.evidence.cells import cell_at, cell_size
 from studio.foundations.arrays import Array, Bytes, Floats
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.numba_in_threads import EXACT, njit
 
-CELLS = 320
-"""Cells along the longer side of a picture."""
 CHANGED_SHARE, SHADOW_SHARE = 0.375, 0.5
 """Of a cell's area, so that it counts as changed; of what changed in it, so that it counts as like a shadow."""
 SAME, CHANGED, LIKE_SHADOW = 0, 1, 2
@@ -69,11 +67,6 @@ class Cells:
     kinds: Bytes
     size: int
     brightness: Floats
-
-
-def cell_size(height: int, width: int) -> int:
-    """Pixels along the side of a picture's cells."""
-    return max(1, -(-max(height, width) // CELLS))
 
 
 def cells_of(mask: Bytes, shadow: Bytes | None, brightness: Floats | None = None) -> Cells:
@@ -290,30 +283,6 @@ def _maps(seen: Sequence[Cells]) -> NDArray[np.int64]:
         own[:] = (begin, *cells.kinds.shape, cells.size)
         begin += cells.kinds.size
     return maps
-
-
-@njit(**EXACT)
-def cell_at(
-    maps: NDArray[np.int64], views: Array, other: int, x: float, y: float, z: float
-) -> tuple[int, int]:
-    """Row and column of the cell in which a camera sees a place (mm); -1, -1 where it does not. maps : of `_maps`.
-    views : (V, 26) K's rows, distortion, rotation, translation and centre.
-    """
-    view = views[other]
-    depth = view[17] * x + view[18] * y + view[19] * z + view[22]
-    if depth <= 0.0:
-        return -1, -1
-    across = (view[11] * x + view[12] * y + view[13] * z + view[20]) / depth
-    down = (view[14] * x + view[15] * y + view[16] * z + view[21]) / depth
-    xd, yd, radial = distorted(across, down, (view[6], view[7], view[8], view[9], view[10]))
-    if not radial > 0.0:
-        return -1, -1
-    _, high, wide, size = maps[other]
-    column = (view[0] * xd + view[1] * yd + view[2] + 0.5) / size
-    row = (view[4] * yd + view[5] + 0.5) / size
-    if not (0.0 <= column < wide and 0.0 <= row < high):
-        return -1, -1
-    return int(row), int(column)
 
 
 @njit(**EXACT)

@@ -156,9 +156,7 @@ class EvidenceMaker:
         view = self.of_mask(camera, frame, mask, unknown if given is None else given)
         if raw.shadow is None:
             return view
-        excluded = self._backgrounds.exclusion(camera)
-        shadow = raw.shadow if excluded is None else np.where(excluded > 0, np.uint8(0), raw.shadow)
-        return replace(view, shadow=shadow)
+        return replace(view, shadow=_not_excluded(raw.shadow, self._backgrounds.exclusion(camera)))
 
     def views(
         self, cameras: Sequence[str], frames: Sequence[int], progress: Callable[[int, int], None]
@@ -298,12 +296,10 @@ def finished(
     the subject's.
     """
 
-    def without(mask: Bytes) -> Bytes:
-        return mask if excluded is None else np.where(excluded > 0, np.uint8(0), mask)
-
     def tidy(mask: Bytes, knobs: EvidenceSettings) -> Bytes:
         # Before cleaning too: what does not count is not the largest piece.
-        return without(cleaned(without(mask), knobs)) if raw.to_clean else without(mask)
+        counted = _not_excluded(mask, excluded)
+        return _not_excluded(cleaned(counted, knobs), excluded) if raw.to_clean else counted
 
     if raw.unknown is None or not raw.unknown.any():
         return tidy(raw.mask, settings), None
@@ -311,6 +307,10 @@ def finished(
     mask = whole & tidy(raw.mask, replace(settings, mask_min_component=0, mask_keep_components=0))
     unknown = whole - mask
     return mask, unknown if unknown.any() else None
+
+
+def _not_excluded(mask: Bytes, excluded: Bytes | None) -> Bytes:
+    return mask if excluded is None else np.where(excluded > 0, np.uint8(0), mask)
 
 
 @functools.lru_cache(maxsize=16)

@@ -4,7 +4,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.evidence.volume.hull_projection import distorted
+from studio.evidence.cells import cell_at
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.numba_in_threads import EXACT, njit
 from studio.search.trackers.agreement_kernels import distance_to
@@ -49,30 +49,6 @@ def cells_of(
             kinds[row, column] = (
                 CHANGED if changed[column] >= enough else OPEN if told[column] >= enough else SAME
             )
-
-
-@njit(**EXACT)
-def cell_at(
-    maps: NDArray[np.int64], views: Array, view: int, x: float, y: float, z: float
-) -> tuple[int, int]:
-    """Row and column of the cell in which a camera sees a place (mm); -1, -1 where it does not. maps : (V, 4) where a
-    view's cells begin among all, their rows and columns, and their size, pixels. views : (V, 23) K's rows, distortion,
-    rotation and translation.
-    """
-    own = views[view]
-    depth = own[17] * x + own[18] * y + own[19] * z + own[22]
-    if depth <= 0.0:
-        return -1, -1
-    across = (own[11] * x + own[12] * y + own[13] * z + own[20]) / depth
-    down = (own[14] * x + own[15] * y + own[16] * z + own[21]) / depth
-    xd, yd, radial = distorted(across, down, (own[6], own[7], own[8], own[9], own[10]))
-    if not radial > 0.0:
-        return -1, -1
-    _, high, wide, size = maps[view]
-    column, row = (own[0] * xd + own[1] * yd + own[2] + 0.5) / size, (own[4] * yd + own[5] + 0.5) / size
-    if not (0.0 <= column < wide and 0.0 <= row < high):
-        return -1, -1
-    return int(row), int(column)
 
 
 @njit(**EXACT)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, Limb
 from studio.body.scale import scale_of
+from studio.evidence.cells import cell_size
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.geometry.camera import Camera
@@ -50,8 +51,8 @@ BARE_MM = 30.0
 """mm at a person's size: farther from all limbs something is bare."""
 LEAST_VIEWS = 3
 """Fewer see nearly every place in all of them."""
-CELLS, FILLED = 320, 0.375
-"""Cells along the longer side of a picture; so much of one changed, or cannot be told, if it counts as that."""
+FILLED = 0.375
+"""Share of a cell that changed, or cannot be told, if it counts as that."""
 LEAST_MM2 = 900.0
 """mm² at a person's size, of a limb's projection alone, a view: with less it is hidden by others, and nothing is said
 of what it explains."""
@@ -108,7 +109,7 @@ def changes_by_camera(evidence: FrameEvidence) -> Mapping[str, Change]:
 def change_of(view: ViewEvidence) -> Change:
     """What changed in a view, shadows too."""
     height, width = view.mask.shape
-    size = max(1, -(-max(height, width) // CELLS))
+    size = cell_size(height, width)
     kinds = np.zeros((-(-height // size), -(-width // size)), np.uint8)
     shadow, unknown = (view.mask if one is None else one for one in (view.shadow, view.unknown))
     cells_of(
