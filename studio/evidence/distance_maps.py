@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array, Bytes, Floats, Indices
 from studio.foundations.numba_in_threads import EXACT, KERNEL, njit
 
@@ -20,7 +20,7 @@ MOST_POINTS = 300
 SMOOTHED = 1.5
 """Standard deviation, pixels, of the smoothing before a border's direction is measured."""
 BESIDE_UNKNOWN = 2
-"""Pixels from where a mask says nothing within which its border is none of the body's."""
+"""Pixels from what is unknown within which a mask's border may be none of the body's."""
 MARGIN_SHARE = 16
 """Distances are kept up to this from the silhouette, as a share of the picture's longer side."""
 
@@ -30,9 +30,10 @@ class SilhouetteDistances:
     """One view's silhouette as distances.
 
     size : width and height of the picture. corner : left and top of the part of it that `signed` (H, W) covers: pixels
-    from the border, which runs between pixels; negative inside, 0 where the mask says nothing. border : (K, 2) centres
-    of silhouette pixels at its border, evenly spread, without those at the picture's own border and beside where the
-    mask says nothing. outward : (K, 2) unit vectors away from the silhouette.
+    from the border, which runs between pixels; negative inside. border : (K, 2) centres of silhouette pixels at its
+    border, evenly spread, without those at the picture's own border. outward : (K, 2) unit vectors away from the
+    silhouette. Where something hides the body `signed` is 0 and there is no border; at a shadow that is doubted
+    `signed` is half the distance, and every second point of the border is left out.
     """
 
     size: tuple[int, int]
@@ -44,7 +45,7 @@ class SilhouetteDistances:
 
 def silhouette_distances(evidence: FrameEvidence, most: int = MOST_POINTS) -> tuple[SilhouetteDistances, ...]:
     """The distances of every view's mask. most : border points kept of a view."""
-    return tuple(distances_of(view.mask, most, unknown=view.unknown) for view in evidence.views)
+    return tuple(_distances_of_view(view, most, exact=True) for view in evidence.views)
 
 
 _known: WeakKeyDictionary[FrameEvidence, dict[int, Mapping[str, SilhouetteDistances]]] = WeakKeyDictionary()
@@ -59,16 +60,28 @@ def silhouettes_by_camera(
     by_points = _known.setdefault(evidence, {})
     if most not in by_points:
         by_points[most] = {
-            view.camera: distances_of(view.mask, most, exact=False, unknown=view.unknown)
-            for view in evidence.views
+            view.camera: _distances_of_view(view, most, exact=False) for view in evidence.views
         }
     return by_points[most]
 
 
+def _distances_of_view(view: ViewEvidence, most: int, *, exact: bool) -> SilhouetteDistances:
+    # What is unknown of a view with shadows is a shadow that is doubted.
+    return distances_of(view.mask, most, exact=exact, unknown=view.unknown, doubted=view.shadow is not None)
+
+
 def distances_of(
-    mask: Bytes, most: int = MOST_POINTS, *, exact: bool = True, unknown: Bytes | None = None
+    mask: Bytes,
+    most: int = MOST_POINTS,
+    *,
+    exact: bool = True,
+    unknown: Bytes | None = None,
+    doubted: bool = False,
 ) -> SilhouetteDistances:
-    """The distances of a mask (H, W); empty and full masks have no border. unknown : as in `ViewEvidence`."""
+    """The distances of a mask (H, W); empty and full masks have no border. unknown : as in `ViewEvidence`. doubted :
+    whether that is a shadow, which counts half here as in likelihoods: with no border at all a descent slides into the
+    shadow of the feet.
+    """
     size = (mask.shape[1], mask.shape[0])
     left, top, right, bottom = box_of(mask, np.uint8(FOREGROUND))
     if right and unknown is not None:
@@ -96,11 +109,13 @@ def distances_of(
     if open_part is not None:
         side = 2 * BESIDE_UNKNOWN + 1
         near = np.asarray(cv2.dilate(open_part, np.ones((side, side), np.uint8)))
-        kept &= near[points[:, 1], points[:, 0]] == 0
+        beside = np.flatnonzero(kept & (near[points[:, 1], points[:, 0]] > 0))
+        kept[beside[1::2] if doubted else beside] = False
     points = points[kept][:: max(1, -(-int(kept.sum()) // most))]
     outward = slopes_at(points, np.asarray(cv2.GaussianBlur(signed, (0, 0), SMOOTHED), np.float32))
     if open_part is not None:
-        signed = np.where(open_part > 0, np.float32(0.0), signed)
+        counts = np.float32(0.5 if doubted else 0.0)
+        signed = np.where(open_part > 0, counts * signed, signed)
     return SilhouetteDistances(size, (left, top), signed, points + np.array([left, top], np.float64), outward)
 
 

@@ -43,12 +43,18 @@ PART = 0.06
 the other cameras by things that stand on the floor."""
 NO_SHADOW, HIDDEN, SHADOW = 0, 1, 2
 """What a camera sees of a place of the floor."""
-DENIED, DOUBTED, LIES_THERE = 0, 1, 2
-"""What all cameras together say of a shadow on the floor."""
+DENIED, BARELY_SEEN, DOUBTED, SEEN_ONCE, LIES_THERE = range(5)
+"""What all cameras together say of a shadow on the floor. Two of them wait for what is said around: only one other
+camera sees it, and others see bare floor (BARELY_SEEN) or do not (SEEN_ONCE)."""
 CONFIRMING, DENYING = 2, 2
 """Other cameras that see a shadow, without which it is doubted, and that see bare floor, so that one alone that sees a
 shadow does not count. Of twelve drawn people in the colours of their rooms, what one camera confirms and something
 above the floor may hide is the subject's by three parts of seven; what two confirm, by one part of twenty."""
+WINDOW, SEEN_AROUND = 7, 0.9
+"""Cells along a side, around one that only one other camera confirms; of those in it that look like a shadow, the
+share that is confirmed too, so that this one is a shadow: a thing that stands on the floor keeps a camera from seeing
+the whole of it. Of the same twelve, and of ten in other clothes, such cells are the subject's by one part of seventeen,
+and the others that one camera confirms by one of two and a half."""
 SUBJECT, UNKNOWN = 1, 2
 """Of cells that look like a shadow: what they are instead, and where that cannot be told."""
 SAMPLED, LOWER, AROUND = 800, 0.03, 0.05
@@ -184,13 +190,15 @@ class FloorShadows:
             # z = 0 explains more, what stands on it is hidden, or calibrations are off.
             heights = scene[0, 2] + self._distance * np.arange(*FLOORS)
             others = [shadows_at(height) for height in heights]
-            counts = [np.count_nonzero(other) for other in others]
-            most, at_zero = int(np.argmax(counts)), np.count_nonzero(explained)
+            counts = [np.count_nonzero(other > BARELY_SEEN) for other in others]
+            most, at_zero = int(np.argmax(counts)), np.count_nonzero(explained > BARELY_SEEN)
             if counts[most] > at_zero:
                 explained, scene[0, 2] = others[most], heights[most]
             elif counts[most] < at_zero:
                 scene[0, 2] = 0.0
         scene[0, 2] += (ABOVE if tolerance else CLEARLY_ABOVE) * self._distance
+        for number, (own, cells) in enumerate(zip(like, seen, strict=True)):
+            explained[owners == number] = _settled(explained[owners == number], own, cells.kinds.shape)
         certain = explained == LIES_THERE
         places = lowest_changed(
             everything, maps, self._views, owners, rays, certain, scene, STEP * self._distance, least
@@ -253,6 +261,19 @@ class FloorShadows:
         flat = cv2.undistortPoints(places[:, None], camera.matrix, camera.distortion)[:, 0]
         rays = np.column_stack([flat, np.ones(len(flat))]) @ camera.rotation
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+def _settled(explained: Bytes, own: NDArray[np.int64], shape: tuple[int, ...]) -> Bytes:
+    """(K,) DENIED, DOUBTED or LIES_THERE: a camera's cells that one other camera confirms are as those around them.
+    explained : (K,) what is said of the cells own (K,), numbers in a picture of cells of that shape.
+    """
+    once = (explained == BARELY_SEEN) | (explained == SEEN_ONCE)
+    around = np.zeros((2, *shape), np.float32)
+    around[0].ravel()[own] = 1.0
+    around[1].ravel()[own] = once | (explained == LIES_THERE)
+    like, confirmed = (cv2.boxFilter(each, -1, (WINDOW, WINDOW)).ravel()[own] for each in around)
+    said = np.where(explained == BARELY_SEEN, DENIED, np.where(explained == SEEN_ONCE, DOUBTED, explained))
+    return np.where(once & (confirmed >= SEEN_AROUND * like), LIES_THERE, said).astype(np.uint8)
 
 
 def _drop_lesser_parts(chosen: Bytes, kinds: Bytes) -> None:
@@ -353,7 +374,7 @@ def on_floor(
     height: float,
     doubts: bool,
 ) -> NDArray[np.uint8]:
-    """(K,) whether what is behind a cell on the floor, at a height (mm), may be shadow (DENIED, DOUBTED, LIES_THERE):
+    """(K,) whether what is behind a cell on the floor, at a height (mm), may be shadow (DENIED to LIES_THERE):
     some other camera sees one as dark there, or the place is hidden from all that see it; where a cell's own brightness
     is not known that it is hidden from one is enough. kinds, brightness : of all cells. maps, views : as of `cell_at`.
     owners : (K,) the cells' cameras. rays : (K, 3). own : (K,) the cells' brightness. tolerance : as of
@@ -382,10 +403,10 @@ def on_floor(
             if shadows and not asks:
                 break
         if shadows:
-            if asks and shadows < CONFIRMING and bare >= DENYING:
-                continue
-            confirmed = not asks or shadows >= min(CONFIRMING, shadows + hidden + bare)
-            explained[k] = LIES_THERE if confirmed else DOUBTED
+            if not asks or shadows >= min(CONFIRMING, shadows + hidden + bare):
+                explained[k] = LIES_THERE
+            else:
+                explained[k] = BARELY_SEEN if bare >= DENYING else SEEN_ONCE
         elif hidden > 0 and (own[k] == 0.0 or bare == 0):
             explained[k] = DOUBTED if asks else LIES_THERE
     return explained

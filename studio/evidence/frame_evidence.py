@@ -23,7 +23,8 @@ class ViewEvidence:
         background may have a mask of zeros, where none is needed.
     unknown : (H, W) uint8, 255 where it cannot be told whether a pixel is the body's: another subject is in front of
         it, or it looks like a shadow that too few cameras confirm; else 0. None: nowhere. Distances of silhouettes
-        (`distance_maps`) leave it out, a hull is not carved by it (`open_mask`), likelihoods count it by `half_mask`.
+        (`distance_maps`) leave the first out and count the second half, a hull is not carved by it (`open_mask`),
+        likelihoods count it by `half_mask`.
     shadow : (H, W) uint8, 255 where a pixel changed but passed for a shadow, whatever became of it. None: nowhere.
     """
 

@@ -1,5 +1,7 @@
 """What may be the subject's or not counts as neither, in every user of a frame's evidence."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,19 @@ def test_a_border_at_the_unknown_is_none() -> None:
     assert {seen.border[:, 0].min(), seen.border[:, 1].min(), seen.border[:, 1].max()} == {40.0, 20.0, 99.0}
     row, column = 60 - seen.corner[1], 90 - seen.corner[0]
     assert seen.signed[row, column] == 0.0
+
+
+def test_a_border_at_a_doubted_shadow_counts_half() -> None:
+    """The same, where the picture of what changed shows that the unknown looks like a shadow."""
+    view = dataclasses.replace(view_of(BODY, UNKNOWN), shadow=UNKNOWN)
+    (plain,) = silhouette_distances(FrameEvidence(0, (view_of(BODY, None),)))
+    (seen,) = silhouette_distances(FrameEvidence(0, (view,)))
+    counts = [int((one.border[:, 0] >= 78).sum()) for one in (plain, seen)]
+    assert counts[1] == counts[0] // 2
+    assert len(plain.border) - len(seen.border) == counts[0] - counts[1]
+    row, column = 60 - seen.corner[1], 90 - seen.corner[0]
+    # From the border between columns 79 and 80 to the middle of column 90.
+    assert seen.signed[row, column] == 0.5 * 10.5
 
 
 def test_the_unknown_holds_a_hand_that_it_parts_from_the_body() -> None:
