@@ -50,11 +50,11 @@ CONFIRMING, DENYING = 2, 2
 """Other cameras that see a shadow, without which it is doubted, and that see bare floor, so that one alone that sees a
 shadow does not count. Of twelve drawn people in the colours of their rooms, what one camera confirms and something
 above the floor may hide is the subject's by three parts of seven; what two confirm, by one part of twenty."""
-WINDOW, SEEN_AROUND = 7, 0.9
+WINDOW, SEEN_AROUND = 7, 0.97
 """Cells along a side, around one that only one other camera confirms; of those in it that look like a shadow, the
 share that is confirmed too, so that this one is a shadow: a thing that stands on the floor keeps a camera from seeing
-the whole of it. Of the same twelve, and of ten in other clothes, such cells are the subject's by one part of seventeen,
-and the others that one camera confirms by one of two and a half."""
+the whole of it. Of those twelve and twelve in other clothes, such cells are the subject's by one part of forty, and the
+others that one camera confirms by three of ten."""
 SUBJECT, UNKNOWN = 1, 2
 """Of cells that look like a shadow: what they are instead, and where that cannot be told."""
 SAMPLED, LOWER, AROUND = 800, 0.03, 0.05
