@@ -26,7 +26,7 @@ from studio.foundations.knobs import next_frame_knob
 from studio.search.trackers.agreement import Agreement, Disagreement
 from studio.search.trackers.hidden_areas import learnt, without_hidden
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
-from studio.search.trackers.limbs_elsewhere import Change, Elsewhere, LimbsElsewhere, lost_of, none_missed
+from studio.search.trackers.limbs_elsewhere import Change, LimbsElsewhere, lost_of, none_missed
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import Distances, RefinementSettings, Refiner
 from studio.search.trackers.tracker import (
@@ -143,15 +143,25 @@ class FrameRefiner:
                 rng, seen_frame.hypothesis(pose), seen_frame, result.carried.previous_estimate
             )
             pose, off = found.pose, found.off
+        changed = () if changes_of is None or not witness.usable else tuple(changes_of().values())
+        elsewhere = witness.of(pose, changed, memory) if changed else {}
+        if settings.redraw_limbs and (named := lost_of(elsewhere)):
+            shown = witness.shown(pose, changed, named, memory, settings.refine_frame_points)
+            without = without_hidden(shown, agreement.cameras, agreement.mm_per_pixel(pose), memory)
+            rng = keyed_generator(self._seed, result.frame, 0, 1, REDRAWN)
+            seen_frame = SeenFrame(redrawing, agreement, without)
+            began_with = seen_frame.hypothesis(pose)
+            found, more = redrawn(rng, began_with, seen_frame, result.carried.previous_estimate)
+            evaluations += more
+            if found is not began_with:
+                pose, off, masks, silhouettes = found.pose, found.off, tuple(shown), without
+                elsewhere = witness.of(pose, changed, memory)
         weight = float(problem.log_likelihood(pose[None])[0])
         estimate = dataclasses.replace(result.estimate, pose=pose, searched=start, log_weight=weight)
         carried = _carried(result, pose, settings.next_frame_from, refiner)
         if matrix is None or pose is not ended.pose:
             matrix = refiner.loss(pose, silhouettes)[2]
         certainty = certainty_of.of(pose, matrix, memory)
-        elsewhere = dict[str, Elsewhere]()
-        if changes_of is not None and witness.usable:
-            elsewhere = witness.of(pose, tuple(changes_of().values()), memory)
         memory = {**learnt(memory, off, agreement.cameras, masks), **certainty.moved}
         return dataclasses.replace(
             result,

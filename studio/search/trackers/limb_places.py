@@ -135,15 +135,17 @@ def places_left_bare(
     low: Array,
     steps: NDArray[np.int64],
     spacing: float,
-) -> NDArray[np.int64]:
-    """(G,) how many places within a limb's reach no view sees unchanged and two or more see bare.
+    places: Array,
+) -> tuple[NDArray[np.int64], int]:
+    """(G,) how many places within a limb's reach no view sees unchanged and two or more see bare; and how many of
+    places (M, 3), mm, were filled in with the first of them.
 
     kinds, near : of all cells; near is above 0 beside a limb. rough : of squares of ROUGH by ROUGH cells, 0 where no
     place of a block around one seen there can have changed; begins : (V, 2) where a view's squares begin among all, and
     their columns. maps, views : as of `cell_at`. roots : (G, 3) mm, and reaches : (G,) mm, 0 for limbs that do not
     count. low : (3,) and steps : (3,) of the grid, in blocks.
     """
-    limbs = len(reaches)
+    limbs, filled = len(reaches), 0
     found, within = np.zeros(limbs, np.int64), np.zeros(limbs, np.bool_)
     half = 0.5 * (BLOCK - 1) * spacing
     for block in range(steps[0] * steps[1] * steps[2]):
@@ -192,4 +194,7 @@ def places_left_bare(
                         bare += kind != OPEN and near[at] == 0
                     if not refuted and bare >= BARE_VIEWS:
                         found += within
-    return found
+                        if filled < len(places):
+                            places[filled, 0], places[filled, 1], places[filled, 2] = x, y, z
+                            filled += 1
+    return found, filled

@@ -12,10 +12,11 @@ The other way round, where all limbs explain enough by themselves none is missed
 bare: a shadow on a stool is changed in all views, as is the stool that somebody pushed.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
+import cv2
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -24,9 +25,11 @@ from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, Limb
 from studio.body.scale import scale_of
 from studio.evidence.cells import cell_size
+from studio.evidence.distance_maps import SilhouetteDistances, distances_of
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
-from studio.foundations.arrays import Array, Bytes
+from studio.foundations.arrays import Array, Bytes, Indices
 from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
 from studio.search.trackers.agreement import Agreement, limb_names
 from studio.search.trackers.hidden_areas import FRAMES
 from studio.search.trackers.hidden_areas import cell_size as hidden_size
@@ -66,6 +69,9 @@ is named, and on frames of tracked ones. Arms of a person who sits beside a chan
 one who walks 0.35, with nothing unexplained."""
 SURELY_EXPLAINED, SURELY_SHOWN = 0.93, 0.39
 """Where all limbs explain and show more, none is missed."""
+AROUND_MM, MOST_PLACES = 45.0, 4096
+"""mm at a person's size: what looks like a shadow is shown so far from a place where a limb is elsewhere; places that
+are looked at."""
 REACH = 1.05
 """Times a limb's length: how far from its root it may end."""
 WIDER = 1.2
@@ -89,11 +95,12 @@ class Elsewhere:
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
     """What changed in a view. kinds : (h, w) SAME, CHANGED or OPEN, of cells. size : pixels along a cell's
-    side.
+    side. view : its evidence.
     """
 
     kinds: Bytes
     size: int
+    view: ViewEvidence
 
 
 _known: WeakKeyDictionary[FrameEvidence, Mapping[str, Change]] = WeakKeyDictionary()
@@ -115,7 +122,7 @@ def change_of(view: ViewEvidence) -> Change:
     cells_of(
         view.mask, shadow, unknown, size, FILLED, kinds, view.shadow is not None, view.unknown is not None
     )
-    return Change(kinds, size)
+    return Change(kinds, size, view)
 
 
 class LimbsElsewhere:
@@ -144,6 +151,60 @@ class LimbsElsewhere:
         """By limb with a joint of its own, as named in the body's parameters. pose : (D,). changed : one a camera.
         memory : of the frame's start, with known occlusions.
         """
+        bare, own, _ = self._look(pose, changed, memory, self._reaches)
+        spacing = SPACING * self._scale
+        found = dict[str, Elsewhere]()
+        for limb in self._bending:
+            at = self._limbs.index(limb)
+            whole, alone, explained = own[:, at]
+            found[limb] = Elsewhere(
+                float(bare[at]) * spacing**3 / max(self._volumes[at], 1e-9),
+                float(explained / alone) if alone >= LEAST_MM2 * len(self._cameras) else 1.0,
+                float(explained / max(whole, 1.0)),
+            )
+        return found
+
+    def shown(
+        self,
+        pose: Array,
+        changed: Sequence[Change],
+        limbs: Collection[str],
+        memory: Mapping[str, Array] | None,
+        most: int,
+    ) -> list[SilhouetteDistances]:
+        """The silhouettes, one a camera, with what looks like a shadow, or cannot be told, where some limbs of a pose
+        (D,) are elsewhere. most : border points kept of a view. Others : as of `of`.
+        """
+        reaches = np.where([limb in limbs for limb in self._limbs], self._reaches, 0.0)
+        places = self._look(pose, changed, memory, reaches, MOST_PLACES)[2]
+        found = list[SilhouetteDistances]()
+        for camera, change, mm in zip(
+            self._cameras, changed, self._agreement.mm_per_pixel(pose), strict=True
+        ):
+            view = change.view
+            near = np.zeros_like(view.mask)
+            for at in _pixels(camera, places):
+                cv2.circle(near, (int(at[0]), int(at[1])), max(1, round(AROUND_MM / mm)), (255,), -1)
+            if view.shadow is None:
+                near &= view.mask
+            else:
+                near &= view.shadow if view.unknown is None else view.shadow | view.unknown
+            unknown = None if view.unknown is None else view.unknown & ~near
+            found.append(distances_of(view.mask | near, most, exact=False, unknown=unknown))
+        return found
+
+    def _look(
+        self,
+        pose: Array,
+        changed: Sequence[Change],
+        memory: Mapping[str, Array] | None,
+        reaches: Array,
+        most: int = 0,
+    ) -> tuple[NDArray[np.int64], Array, Array]:
+        """(G,) how many places within a limb's reach changed and are left bare; (3, G) mm² in which each limb lies,
+        alone, and of these what changed; (K, 3) the first `most` of the places. reaches : (G,) mm, 0 for limbs that are
+        not looked for.
+        """
         corners, sizes = self._agreement.corners(pose), self._agreement.mm_per_pixel(pose)
         ends = limb_ends(self._body, pose[None])[0]
         maps, begin = np.zeros((len(changed), 4), np.int64), 0
@@ -159,17 +220,18 @@ class LimbsElsewhere:
             own += counts
             kinds.append(seen.ravel())
             near.append(beside.ravel())
-            nearest = (roots @ camera.rotation[2] + camera.translation[2] - self._reaches).min() - radius
+            nearest = (roots @ camera.rotation[2] + camera.translation[2] - reaches).min() - radius
             wide = WIDER * float(camera.matrix[0, 0]) * radius / max(nearest, radius) / view.size
             squares = _squares_around(seen, wide)
             begins[number] = sum(map(len, rough)), squares.shape[1]
             rough.append(squares.ravel())
-        free = self._reaches > 0.0
-        low = (roots - self._reaches[:, None])[free].min(axis=0)
-        high = (roots + self._reaches[:, None])[free].max(axis=0)
+        free = reaches > 0.0
+        low = (roots - reaches[:, None])[free].min(axis=0)
+        high = (roots + reaches[:, None])[free].max(axis=0)
         low[2] = max(low[2], ABOVE_FLOOR * self._scale)
         steps = np.maximum(np.ceil((high - low) / (spacing * BLOCK)), 1.0).astype(np.int64)
-        bare = places_left_bare(
+        places = np.zeros((most, 3))
+        bare, filled = places_left_bare(
             np.concatenate(kinds),
             np.concatenate(near),
             np.concatenate(rough),
@@ -177,21 +239,13 @@ class LimbsElsewhere:
             maps,
             self._views,
             roots,
-            self._reaches,
+            reaches,
             low,
             steps,
             spacing,
+            places,
         )
-        found = dict[str, Elsewhere]()
-        for limb in self._bending:
-            at = self._limbs.index(limb)
-            whole, alone, explained = own[:, at]
-            found[limb] = Elsewhere(
-                float(bare[at]) * spacing**3 / max(self._volumes[at], 1e-9),
-                float(explained / alone) if alone >= LEAST_MM2 * len(self._cameras) else 1.0,
-                float(explained / max(whole, 1.0)),
-            )
-        return found
+        return bare, own, places[:filled]
 
     def lost(
         self, pose: Array, changed: Sequence[Change], memory: Mapping[str, Array] | None = None
@@ -237,6 +291,14 @@ def _numbers(camera: Camera) -> Array:
     """(23,) as of `cell_at`."""
     parts = camera.matrix[:2].ravel(), camera.distortion, camera.rotation.ravel(), camera.translation
     return np.concatenate(parts)
+
+
+def _pixels(camera: Camera, places: Array) -> Indices:
+    """(K, 2) pixels in the picture at which places (N, 3) are seen, each once."""
+    at = project(camera, places)[0]
+    at = np.rint(at[np.isfinite(at).all(axis=1)])
+    inside = ((at >= 0.0) & (at < (camera.width, camera.height))).all(axis=1)
+    return np.unique(at[inside].astype(np.int64), axis=0)
 
 
 def _squares_around(kinds: Bytes, radius: float) -> Bytes:
