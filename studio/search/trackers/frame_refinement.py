@@ -9,7 +9,7 @@ stands in front of the body are left out (`hidden_areas`).
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -151,7 +151,8 @@ class FrameRefiner:
             rng = keyed_generator(self._seed, result.frame, 0, 1, REDRAWN)
             seen_frame = SeenFrame(redrawing, agreement, without)
             began_with = seen_frame.hypothesis(pose)
-            found, more = redrawn(rng, began_with, seen_frame, result.carried.previous_estimate)
+            last = result.carried.previous_estimate
+            found, more = redrawn(rng, began_with, seen_frame, last, elsewhere=named)
             evaluations += more
             if found is not began_with:
                 pose, off, masks, silhouettes = found.pose, found.off, tuple(shown), without
@@ -251,19 +252,25 @@ def redrawn(
     last: Array | None = None,
     *,
     turn: bool = True,
+    elsewhere: Collection[str] = (),
 ) -> tuple[Hypothesis, int]:
     """The hypothesis with its doubtful limbs resampled, and the number of poses compared. last : (D,) pose of the last
-    frame, which is tried as well. turn : whether a body whose tail is lost may be turned round.
+    frame, which is tried as well. turn : whether a body whose tail is lost may be turned round. elsewhere : limbs that
+    are resampled first, however little they disagree: what a lost limb leaves bare may be nearer to another one.
     """
     evaluations, tried, began_with = 0, set[str](), found
     if last is not None:
         found = frame.better(found, last)
     while True:
         shares = found.off.shares()
-        doubtful = [name for name in shares if shares[name] >= DOUBTFUL_SHARE and name not in tried]
+        doubtful = [
+            name
+            for name in shares
+            if (shares[name] >= DOUBTFUL_SHARE or name in elsewhere) and name not in tried
+        ]
         if not doubtful:
             break
-        limb = max(doubtful, key=lambda name: shares[name])
+        limb = max(doubtful, key=lambda name: (name in elsewhere, shares[name]))
         tried.add(limb)
         own = bent_by(frame.refiner, limb)
         if len(own) > MOST_TOGETHER and has_tail(frame.refiner.body):
