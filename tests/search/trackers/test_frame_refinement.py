@@ -103,26 +103,37 @@ def test_a_lost_arm_is_resampled(body: BodyModel, truth: np.ndarray, refined) ->
     assert found.evaluations > stuck.evaluations
 
 
-def test_an_arm_that_only_the_pictures_show_is_named(
-    body: BodyModel, truth: np.ndarray, evidence: FrameEvidence, problem: FrameLikelihood
-) -> None:
+def folded_away(body: BodyModel, truth: np.ndarray, whole: FrameEvidence) -> tuple[np.ndarray, FrameEvidence]:
+    """The true pose with its left arm along the trunk, and the evidence whose masks show that; all else that the true
+    pose covers passed for shadow.
+    """
     names = [entry.name for entry in body.parameters]
     pose = truth.copy()
     pose[names.index("left_shoulder_rx")], pose[names.index("left_elbow_ry")] = -0.5, 0.0
     folded = drawn_evidence(body, pose, CAMERAS)
-    seen = dataclasses.replace(
-        folded,
-        views=tuple(
-            dataclasses.replace(view, shadow=whole.mask & ~view.mask)
-            for view, whole in zip(folded.views, evidence.views, strict=True)
-        ),
-    )
+    views = zip(folded.views, whole.views, strict=True)
+    seen = tuple(dataclasses.replace(view, shadow=full.mask & ~view.mask) for view, full in views)
+    return pose, dataclasses.replace(folded, views=seen)
+
+
+def test_an_arm_that_only_the_pictures_show_is_named_and_drawn_there(
+    body: BodyModel, truth: np.ndarray, evidence: FrameEvidence, problem: FrameLikelihood
+) -> None:
+    pose, seen = folded_away(body, truth, evidence)
     refiner, silhouettes = FrameRefiner(body, CAMERAS, 7), partial(silhouettes_by_camera, seen)
+    changes, still = partial(changes_by_camera, seen), FrameRefinementSettings(redraw_limbs=False)
     alone = refiner.refined(searched(pose), silhouettes, problem, SETTINGS)
-    shown = refiner.refined(searched(pose), silhouettes, problem, SETTINGS, partial(changes_by_camera, seen))
-    assert alone.limbs_lost == ()
-    assert "left arm" in shown.limbs_lost
-    assert np.array_equal(alone.estimate.pose, shown.estimate.pose)
+    named = refiner.refined(searched(pose), silhouettes, problem, still, changes)
+    drawn = refiner.refined(searched(pose), silhouettes, problem, SETTINGS, changes)
+    assert alone.limbs_lost == drawn.limbs_lost == ()
+    assert "left arm" in named.limbs_lost
+    assert np.array_equal(alone.estimate.pose, named.estimate.pose)
+    assert off(body, named.estimate.pose, truth) > 30.0
+    assert off(body, drawn.estimate.pose, truth) < 10.0
+    assert drawn.evaluations > alone.evaluations
+    assert np.array_equal(drawn.carried.estimate, drawn.estimate.pose)
+    again = FrameRefiner(body, CAMERAS, 7).refined(searched(pose), silhouettes, problem, SETTINGS, changes)
+    assert np.array_equal(again.estimate.pose, drawn.estimate.pose)
 
 
 @pytest.mark.parametrize(
