@@ -30,14 +30,14 @@ from studio.runs.run_footage import filmed_cameras, footage_of
 from studio.runs.tracks import BEST, Track, read_track, track_stamp
 from studio.search.likelihood.overlay import limb_contours
 from studio.search.settings import RunSettings, settings_from_values
-from studio.search.trackers.agreement import Agreement, Disagreement, without_bare
+from studio.search.trackers.agreement import Agreement, Disagreement
 from studio.search.trackers.hidden_areas import without_hidden
 from studio.search.trackers.limbs_elsewhere import (
     Elsewhere,
     LimbsElsewhere,
     changes_by_camera,
     lost_of,
-    none_missed,
+    without_sure,
 )
 from studio.search.trackers.loss_detection import anything_seen
 from studio.search.trackers.start_candidates import facing
@@ -209,7 +209,7 @@ def check_run(
                 elsewhere = dict[str, Elsewhere]()
                 if witness.usable:
                     elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
-                off = without_bare(off) if none_missed(elsewhere) else off
+                off = without_sure(off, elsewhere)
                 contradicted += _with_elsewhere(frame, off.shares(), lost_of(elsewhere))
     check = RunCheck(
         track=chosen.name,

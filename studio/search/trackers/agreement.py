@@ -8,7 +8,7 @@ Everything is in mm² at a body of a person's size (`mm_at`), so that cameras, r
 """
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,9 +132,12 @@ class Agreement:
         return found
 
 
-def without_bare(off: Disagreement) -> Disagreement:
-    """The disagreement where no limb is missed: what it leaves bare is something else."""
-    return replace(off, bare=np.zeros_like(off.bare))
+def without_bare(off: Disagreement, limbs: Collection[str] | None = None) -> Disagreement:
+    """The disagreement where none of some limbs is missed: what lies bare beside them is something else. limbs : None
+    for all.
+    """
+    kept = np.array([limbs is not None and limb not in limbs for limb in off.limbs])
+    return replace(off, bare=np.where(kept, off.bare, 0.0))
 
 
 def _bare_points(

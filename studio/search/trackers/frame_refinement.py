@@ -26,7 +26,7 @@ from studio.foundations.knobs import next_frame_knob
 from studio.search.trackers.agreement import Agreement, Disagreement
 from studio.search.trackers.hidden_areas import learnt, without_hidden
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
-from studio.search.trackers.limbs_elsewhere import Change, LimbsElsewhere, lost_of, none_missed
+from studio.search.trackers.limbs_elsewhere import Change, LimbsElsewhere, lost_of
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import Distances, RefinementSettings, Refiner
 from studio.search.trackers.tracker import (
@@ -170,7 +170,7 @@ class FrameRefiner:
             carried=dataclasses.replace(carried, memory=memory),
             evaluations=result.evaluations + evaluations,
             disagreement=off.shares(),
-            limb_loss=certainty.lost(off, lost_of(elsewhere), none_missed(elsewhere)),
+            limb_loss=certainty.lost(off, elsewhere),
         )
 
     def _made_for(self, names: tuple[str, ...], steps: int) -> "_Prepared":

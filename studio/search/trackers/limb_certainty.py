@@ -26,7 +26,8 @@ Of the 44, which come of one seed, 34 of the 37 on *hard* are named, none of two
 rule before named an arm before the trunk on two walks of that half, which was seen before this one was chosen.
 
 What changed in the pictures, also where masks have it for a shadow, is another witness (`limbs_elsewhere`). It names
-limbs that no mask shows; where it misses none what a pose leaves bare is something else.
+limbs that no mask shows; beside a limb that it sees where the pose has it, what the pose leaves bare is something else,
+and a jump of a limb to where it shows is a fast movement: it jumps out of a wrong place, too.
 
 Tried without gain: the spread of the search's cloud, and how far the refinement moved the limb.
 
@@ -35,7 +36,7 @@ The standard deviations rank limbs; they are not calibrated. Scaled so that 68 %
 a clothed body and the cones differ, which is the same in all frames of a clip.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +44,8 @@ import numpy as np
 from studio.body.forward_kinematics import limb_ends
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array
-from studio.search.trackers.agreement import LEAST_AREA, Disagreement, limb_names, without_bare
+from studio.search.trackers.agreement import LEAST_AREA, Disagreement, limb_names
+from studio.search.trackers.limbs_elsewhere import Elsewhere, is_shown, lost_of, without_sure
 from studio.search.trackers.refinement import Refiner, rigid_limbs
 from studio.search.trackers.tracker import LIMB_LOST_SHARE, MOVED
 
@@ -77,28 +79,30 @@ class Certainty:
     jump: Array
     moved: Mapping[str, Array]
 
-    def lost(
-        self, off: Disagreement, elsewhere: Collection[str] = (), none_missed: bool = False
-    ) -> dict[str, float]:
-        """By limb the probability that it is lost. off : the pose's disagreement with the silhouettes. elsewhere :
-        limbs that the pictures show in another place. none_missed : whether what the pose leaves bare is no limb.
+    def lost(self, off: Disagreement, pictures: Mapping[str, Elsewhere] | None = None) -> dict[str, float]:
+        """By limb the probability that it is lost. off : the pose's disagreement with the silhouettes. pictures : by
+        limb what changed in them, if that is known.
         """
-        signs, bare = self.signs(without_bare(off) if none_missed else off)
+        known = pictures or {}
+        signs, bare = self.signs(without_sure(off, known), known)
         odds = np.where(bare > LIMB_LOST_SHARE, np.inf, CONSTANT + signs @ WEIGHTS)
+        elsewhere = lost_of(known)
         odds = np.where([limb in elsewhere for limb in self.limbs], np.maximum(odds, WITNESSED), odds)
         return dict(zip(self.limbs, (1.0 / (1.0 + np.exp(-odds))).tolist(), strict=True))
 
-    def signs(self, off: Disagreement) -> tuple[Array, Array]:
+    def signs(self, off: Disagreement, pictures: Mapping[str, Elsewhere]) -> tuple[Array, Array]:
         """(G, 3) logarithms of outside, of bare, and of jump times that of deviation; (G,) share of a limb's area that
-        it leaves bare.
+        it leaves bare. A jump to where the pictures show the limb is none.
         """
         own = (np.array(off.limbs) == np.array(self.limbs)[:, None]).astype(float)
         area = own @ np.maximum(off.area.sum(axis=0), LEAST_AREA)
         outside, bare = own @ off.outside.sum(axis=0) / area, own @ off.bare.sum(axis=0) / area
+        shown = [limb in pictures and is_shown(pictures[limb]) for limb in self.limbs]
+        jump = np.where(shown, 0.0, self.jump)
         logarithms = (
             np.log(np.minimum(outside, MOST_OUTSIDE) + LEAST_OUTSIDE),
             np.log(bare + LEAST_BARE),
-            np.log1p(self.jump / JUMP_MM) * np.log(np.maximum(self.deviation / DETERMINED_MM, 1.0)),
+            np.log1p(jump / JUMP_MM) * np.log(np.maximum(self.deviation / DETERMINED_MM, 1.0)),
         )
         return np.stack(logarithms, axis=1), bare
 

@@ -8,8 +8,9 @@ well above the floor count. Of the limbs in whose reach such points lie those ar
 projection explains little: a limb that is where it seems covers changed cells that no other limb covers, and a lost one
 lies outside them, or on other limbs.
 
-The other way round, where all limbs explain enough by themselves none is missed, whatever silhouettes the pose leaves
-bare: a shadow on a stool is changed in all views, as is the stool that somebody pushed.
+The other way round, a limb that explains enough by itself is not missed, whatever silhouettes the pose leaves bare
+beside it: a shadow under a runner's foot. Where all do none is: a shadow on a stool is changed in all views, as is the
+stool that somebody pushed.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -30,7 +31,7 @@ from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array, Bytes, Indices
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
-from studio.search.trackers.agreement import Agreement, limb_names
+from studio.search.trackers.agreement import Agreement, Disagreement, limb_names, without_bare
 from studio.search.trackers.hidden_areas import FRAMES
 from studio.search.trackers.hidden_areas import cell_size as hidden_size
 from studio.search.trackers.limb_places import (
@@ -264,10 +265,29 @@ class LimbsElsewhere:
         return near, counts * (size * mm) ** 2
 
 
+def is_sure(one: Elsewhere) -> bool:
+    """Whether a limb surely is where the pose has it."""
+    return one.explained >= SURELY_EXPLAINED and one.shown >= SURELY_SHOWN
+
+
+def is_shown(one: Elsewhere) -> bool:
+    """Whether a limb shows by itself where the pose has it, and nothing else within its reach does: where it jumped to
+    it is.
+    """
+    return one.shown >= SURELY_SHOWN and one.unexplained <= SOME_UNEXPLAINED
+
+
 def none_missed(limbs: Mapping[str, Elsewhere]) -> bool:
     """Whether all limbs are surely where the pose has them; not without any."""
-    return bool(limbs) and all(
-        one.explained >= SURELY_EXPLAINED and one.shown >= SURELY_SHOWN for one in limbs.values()
+    return bool(limbs) and all(is_sure(one) for one in limbs.values())
+
+
+def without_sure(off: Disagreement, limbs: Mapping[str, Elsewhere]) -> Disagreement:
+    """A pose's disagreement with the silhouettes, without what lies bare beside limbs that surely are where it has
+    them; without any that is bare where none is missed.
+    """
+    return without_bare(
+        off, None if none_missed(limbs) else [name for name, one in limbs.items() if is_sure(one)]
     )
 
 

@@ -10,6 +10,7 @@ from studio.evidence.distance_maps import silhouette_distances
 from studio.foundations.arrays import Array
 from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.limb_certainty import Certainty, CertaintyOfLimbs
+from studio.search.trackers.limbs_elsewhere import Elsewhere
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.tracker import LIMB_LOST_PROBABILITY
 
@@ -72,15 +73,37 @@ def test_a_limb_that_jumped_is_doubted_for_some_frames_though_the_silhouettes_ag
     assert after[-1]["left arm"] < 2.0 * known
 
 
+def test_a_jump_to_where_the_pictures_show_the_limb_is_none(body: BodyModel) -> None:
+    steady, jumped = standing(body, **ASIDE), standing(body, **{**ASIDE, "left_shoulder_rx": 1.6})
+    memory: Mapping[str, Array] = {}
+    for _ in range(3):
+        memory = certainty_and_lost(body, steady, steady, memory)[0].moved
+    off = Agreement(body, CAMERAS).of(
+        jumped, silhouette_distances(drawn_evidence(body, jumped, CAMERAS), 150)
+    )
+    leapt, calm = (certainty_and_lost(body, jumped, jumped, known)[0] for known in (memory, {}))
+    for seen, counts in (
+        (Elsewhere(0.05, 0.85, 0.5), False),
+        # It lies on others; another place may be the limb's.
+        (Elsewhere(0.0, 1.0, 0.2), True),
+        (Elsewhere(0.3, 1.0, 0.5), True),
+    ):
+        jumps, still = (one.lost(off, {"left arm": seen})["left arm"] for one in (leapt, calm))
+        assert (jumps > 2.0 * still) is counts
+        assert counts or jumps == still
+
+
 def test_the_pictures_have_a_say_in_what_is_lost(body: BodyModel) -> None:
     aside, inside = standing(body, **ASIDE), standing(body, left_shoulder_rx=0.5, right_shoulder_rx=-0.2)
     off = Agreement(body, CAMERAS).of(inside, silhouette_distances(drawn_evidence(body, aside, CAMERAS), 150))
     found = certainty_and_lost(body, inside, inside)[0]
+    sure, unsure = Elsewhere(0.0, 1.0, 0.6), Elsewhere(0.0, 0.8, 0.6)
     assert found.lost(off)["right arm"] == 1.0
-    assert found.lost(off, none_missed=True)["right arm"] < 1.0
+    assert found.lost(off, {"right arm": sure, "left arm": unsure})["right arm"] < 1.0
+    assert found.lost(off, {"right arm": unsure, "left arm": sure})["right arm"] == 1.0
     sound = Agreement(body, CAMERAS).of(
         aside, silhouette_distances(drawn_evidence(body, aside, CAMERAS), 150)
     )
-    calm = certainty_and_lost(body, aside, aside)[0]
-    assert calm.lost(sound)["left arm"] < LIMB_LOST_PROBABILITY < calm.lost(sound, ("left arm",))["left arm"]
-    assert calm.lost(sound, ("left arm",))["right arm"] == calm.lost(sound)["right arm"]
+    calm, left = certainty_and_lost(body, aside, aside)[0], {"left arm": Elsewhere(0.5, 0.5, 0.5)}
+    assert calm.lost(sound)["left arm"] < LIMB_LOST_PROBABILITY < calm.lost(sound, left)["left arm"]
+    assert calm.lost(sound, left)["right arm"] == calm.lost(sound)["right arm"]

@@ -39,14 +39,14 @@ from studio.results.drawing_footage.real_data import PREFIX, real_data_folder
 from studio.results.evaluation.errors import limb_of_markers, lost_mm
 from studio.runs.setup.shape_on_the_way import fit_session_shape
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, default_settings
-from studio.search.trackers.agreement import FAR_MM, Agreement, limb_names, without_bare
+from studio.search.trackers.agreement import FAR_MM, Agreement, limb_names
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
 from studio.search.trackers.limbs_elsewhere import (
     Change,
     LimbsElsewhere,
     changes_by_camera,
     lost_of,
-    none_missed,
+    without_sure,
 )
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import RefinementSettings, Refiner
@@ -221,7 +221,7 @@ class Looking:
         for _ in range(2):
             certainty = self._certainty.of(pose, matrix, certainty.moved)
         elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
-        lost = certainty.lost(self._agreement.of(pose, seen), lost_of(elsewhere), none_missed(elsewhere))
+        lost = certainty.lost(self._agreement.of(pose, seen), elsewhere)
         return tuple(limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY)
 
     def checked(
@@ -230,7 +230,7 @@ class Looking:
         """The limbs that a check of the run calls contradicted. changed : as in `LimbsElsewhere.of`, of all cameras."""
         elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
         off = self._agreement.of(pose, seen)
-        shares = (without_bare(off) if none_missed(elsewhere) else off).shares()
+        shares = without_sure(off, elsewhere).shares()
         denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
         return (*denied, *lost_of(elsewhere))
 
