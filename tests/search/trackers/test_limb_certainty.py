@@ -84,8 +84,9 @@ def test_a_jump_to_where_the_pictures_show_the_limb_is_none(body: BodyModel) -> 
     leapt, calm = (certainty_and_lost(body, jumped, jumped, known)[0] for known in (memory, {}))
     for seen, counts in (
         (Elsewhere(0.05, 0.85, 0.5), False),
-        # It lies on others; another place may be the limb's.
+        # It lies on others, or beside what changed; another place may be the limb's.
         (Elsewhere(0.0, 1.0, 0.2), True),
+        (Elsewhere(0.0, 0.7, 0.5), True),
         (Elsewhere(0.3, 1.0, 0.5), True),
     ):
         jumps, still = (one.lost(off, {"left arm": seen})["left arm"] for one in (leapt, calm))
