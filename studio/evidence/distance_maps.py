@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import cv2
@@ -52,11 +52,19 @@ _known: WeakKeyDictionary[FrameEvidence, dict[int, Mapping[str, SilhouetteDistan
 
 
 def silhouettes_by_camera(
-    evidence: FrameEvidence, most: int = MOST_POINTS
+    evidence: FrameEvidence,
+    most: int = MOST_POINTS,
+    spots: Mapping[str, tuple[Indices, float]] | None = None,
 ) -> Mapping[str, SilhouetteDistances]:
     """The distances of every view's mask by its camera, summed over steps from pixel to pixel: a quarter of the time,
     and up to a fiftieth too long. Kept as long as the evidence is, so that they can be made ready beforehand.
+
+    spots : by camera pixels (K, 2) up to so many pixels from which the masks have what looks like a shadow, too, and
+    what cannot be told; these are not kept.
     """
+    if spots is not None:
+        shown = [_with_spots(view, *spots[view.camera]) for view in evidence.views]
+        return {view.camera: _distances_of_view(view, most, exact=False) for view in shown}
     by_points = _known.setdefault(evidence, {})
     if most not in by_points:
         by_points[most] = {
@@ -68,6 +76,19 @@ def silhouettes_by_camera(
 def _distances_of_view(view: ViewEvidence, most: int, *, exact: bool) -> SilhouetteDistances:
     # What is unknown of a view with shadows is a shadow that is doubted.
     return distances_of(view.mask, most, exact=exact, unknown=view.unknown, doubted=view.shadow is not None)
+
+
+def _with_spots(view: ViewEvidence, pixels: Indices, radius: float) -> ViewEvidence:
+    """The view, its mask as of `silhouettes_by_camera`."""
+    near = np.zeros_like(view.mask)
+    for at in pixels:
+        cv2.circle(near, (int(at[0]), int(at[1])), max(1, round(radius)), (255,), -1)
+    nothing = np.zeros_like(near)
+    near &= (nothing if view.shadow is None else view.shadow) | (
+        nothing if view.unknown is None else view.unknown
+    )
+    unknown = None if view.unknown is None else view.unknown & ~near
+    return replace(view, mask=view.mask | near, unknown=unknown)
 
 
 def distances_of(

@@ -214,3 +214,30 @@ def test_every_views_distances_are_kept_as_long_as_the_evidence() -> None:
     assert silhouettes_by_camera(evidence, 20) is stepped
     assert len(silhouettes_by_camera(evidence)["a"].border) > 20
     assert (stepped["a"].signed != exact[0].signed).any()
+
+
+def test_near_some_pixels_a_mask_has_what_passed_for_shadow_or_cannot_be_told() -> None:
+    nothing = np.zeros((40, 60), np.uint8)
+    mask, shadow, unknown = nothing.copy(), nothing.copy(), nothing.copy()
+    mask[10:20, 5:15] = shadow[10:20, 15:40] = unknown[10:15, 40:50] = 255
+    picture = np.zeros((40, 60, 3), np.uint8)
+    views = [
+        ViewEvidence("a", picture, mask, nothing, unknown=unknown, shadow=shadow),
+        ViewEvidence("b", picture, mask, nothing),
+    ]
+    evidence, spot = FrameEvidence(3, tuple(views)), (np.array([[22, 14], [44, 12]]), 7.0)
+    kept = silhouettes_by_camera(evidence, 20)
+    shown = silhouettes_by_camera(evidence, 20, {"a": spot, "b": spot})
+    assert silhouettes_by_camera(evidence, 20) is kept
+    rows, columns = np.mgrid[:40, :60]
+    near = np.minimum(np.hypot(columns - 22, rows - 14), np.hypot(columns - 44, rows - 12))
+    for name, view in zip("ab", views, strict=True):
+        left, top = shown[name].corner
+        inside = np.zeros(mask.shape, np.bool_)
+        signed = shown[name].signed
+        inside[top : top + signed.shape[0], left : left + signed.shape[1]] = signed < 0.0
+        doubted = (shadow | unknown) > 0 if view.shadow is not None else nothing > 0
+        # A disc of pixels is round within a pixel.
+        assert inside[(mask > 0) | (doubted & (near <= 6.0))].all()
+        assert not inside[(mask == 0) & ~(doubted & (near <= 8.0))].any()
+    np.testing.assert_array_equal(shown["b"].signed, kept["b"].signed)

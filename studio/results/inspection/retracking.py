@@ -6,6 +6,7 @@ What a run does beside the search of a frame and its refinement (looking for a b
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -95,7 +96,7 @@ class Retracking:
         result, evidence = self._search(frame, carried, settings, seed), self._seen[frame]
         return refiner.refined(
             result,
-            lambda points: silhouettes_by_camera(evidence, points),
+            partial(silhouettes_by_camera, evidence),
             self._problems[frame],
             settings.refinement,
             lambda: changes_by_camera(evidence),

@@ -11,7 +11,7 @@ import dataclasses
 import functools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.mirroring import name_twins
 from studio.body.model import BodyModel
 from studio.evidence.volume.alignment import root_parameters, with_root_at
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
 from studio.search.trackers.agreement import Agreement, Disagreement
@@ -101,6 +101,18 @@ def space_after(space: SearchSpace, carried: FilterState, settings: FrameRefinem
     return dataclasses.replace(space, sigma=settings.refined_spread * space.sigma)
 
 
+class SilhouettesOf(Protocol):
+    """A frame's silhouettes by camera."""
+
+    def __call__(
+        self, most: int, spots: Mapping[str, tuple[Indices, float]] | None = None, /
+    ) -> Mapping[str, Distances]:
+        """With at most so many border points each. spots : by camera pixels (K, 2) up to so many pixels from which they
+        have what looks like a shadow, too, and what cannot be told.
+        """
+        ...
+
+
 class FrameRefiner:
     """Refines the frames of one body; what is prepared for some cameras is kept. seed : of the run."""
 
@@ -112,7 +124,7 @@ class FrameRefiner:
     def refined(
         self,
         result: FrameResult,
-        silhouettes_of: Callable[[int], Mapping[str, Distances]],
+        silhouettes_of: SilhouettesOf,
         problem: FrameLikelihood,
         settings: FrameRefinementSettings,
         changes_of: Callable[[], Mapping[str, Change]] | None = None,
@@ -120,8 +132,7 @@ class FrameRefiner:
         """The result with its pose refined, and the next frame's start; unchanged where refinement is off or no mask
         shows anything.
 
-        silhouettes_of : the frame's silhouettes by camera, with at most so many border points each. changes_of : what
-        changed in its pictures, by camera; None: silhouettes alone say which limbs are lost.
+        changes_of : what changed in its pictures, by camera; None: silhouettes alone say which limbs are lost.
         """
         seen: Mapping[str, Distances] = (
             silhouettes_of(settings.refine_frame_points) if settings.refine_frames else {}
@@ -146,7 +157,8 @@ class FrameRefiner:
         changed = () if changes_of is None or not witness.usable else tuple(changes_of().values())
         elsewhere = witness.of(pose, changed, memory) if changed else {}
         if settings.redraw_limbs and (named := lost_of(elsewhere)):
-            shown = witness.shown(pose, changed, named, memory, settings.refine_frame_points)
+            spots = witness.spots(pose, changed, named, memory)
+            shown = tuple(silhouettes_of(settings.refine_frame_points, spots).values())
             without = without_hidden(shown, agreement.cameras, agreement.mm_per_pixel(pose), memory)
             rng = keyed_generator(self._seed, result.frame, 0, 1, REDRAWN)
             seen_frame = SeenFrame(redrawing, agreement, without)
@@ -155,7 +167,7 @@ class FrameRefiner:
             found, more = redrawn(rng, began_with, seen_frame, last, elsewhere=named)
             evaluations += more
             if found is not began_with:
-                pose, off, masks, silhouettes = found.pose, found.off, tuple(shown), without
+                pose, off, masks, silhouettes = found.pose, found.off, shown, without
                 elsewhere = witness.of(pose, changed, memory)
         weight = float(problem.log_likelihood(pose[None])[0])
         estimate = dataclasses.replace(result.estimate, pose=pose, searched=start, log_weight=weight)

@@ -17,7 +17,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
-import cv2
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -26,7 +25,6 @@ from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, Limb
 from studio.body.scale import scale_of
 from studio.evidence.cells import cell_size
-from studio.evidence.distance_maps import SilhouetteDistances, distances_of
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array, Bytes, Indices
 from studio.foundations.geometry.camera import Camera
@@ -74,8 +72,7 @@ MOSTLY_EXPLAINED = 0.8
 """With at least this a limb has not jumped away from where it shows. Without it six of 63 frames of *hard*, whose
 cameras moved, are no longer named."""
 AROUND_MM, MOST_PLACES = 45.0, 4096
-"""mm at a person's size: what looks like a shadow is shown so far from a place where a limb is elsewhere; places that
-are looked at."""
+"""mm at a person's size, up to which what changed beside a place is a limb's that is elsewhere; the most places."""
 REACH = 1.05
 """Times a limb's length: how far from its root it may end."""
 WIDER = 1.2
@@ -99,12 +96,11 @@ class Elsewhere:
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
     """What changed in a view. kinds : (h, w) SAME, CHANGED or OPEN, of cells. size : pixels along a cell's
-    side. view : its evidence.
+    side.
     """
 
     kinds: Bytes
     size: int
-    view: ViewEvidence
 
 
 _known: WeakKeyDictionary[FrameEvidence, Mapping[str, Change]] = WeakKeyDictionary()
@@ -126,7 +122,7 @@ def change_of(view: ViewEvidence) -> Change:
     cells_of(
         view.mask, shadow, unknown, size, FILLED, kinds, view.shadow is not None, view.unknown is not None
     )
-    return Change(kinds, size, view)
+    return Change(kinds, size)
 
 
 class LimbsElsewhere:
@@ -168,34 +164,25 @@ class LimbsElsewhere:
             )
         return found
 
-    def shown(
+    def spots(
         self,
         pose: Array,
         changed: Sequence[Change],
         limbs: Collection[str],
-        memory: Mapping[str, Array] | None,
-        most: int,
-    ) -> list[SilhouetteDistances]:
-        """The silhouettes, one a camera, with what looks like a shadow, or cannot be told, where some limbs of a pose
-        (D,) are elsewhere. most : border points kept of a view. Others : as of `of`.
+        memory: Mapping[str, Array] | None = None,
+    ) -> dict[str, tuple[Indices, float]]:
+        """By camera pixels (K, 2), and up to how many pixels from them the pictures show some limbs of a pose that are
+        elsewhere. Others : as of `of`.
         """
         reaches = np.where([limb in limbs for limb in self._limbs], self._reaches, 0.0)
-        places = self._look(pose, changed, memory, reaches, MOST_PLACES)[2]
-        found = list[SilhouetteDistances]()
-        for camera, change, mm in zip(
-            self._cameras, changed, self._agreement.mm_per_pixel(pose), strict=True
-        ):
-            view = change.view
-            near = np.zeros_like(view.mask)
-            for at in _pixels(camera, places):
-                cv2.circle(near, (int(at[0]), int(at[1])), max(1, round(AROUND_MM / mm)), (255,), -1)
-            if view.shadow is None:
-                near &= view.mask
-            else:
-                near &= view.shadow if view.unknown is None else view.shadow | view.unknown
-            unknown = None if view.unknown is None else view.unknown & ~near
-            found.append(distances_of(view.mask | near, most, exact=False, unknown=unknown))
-        return found
+        places, sizes = (
+            self._look(pose, changed, memory, reaches, MOST_PLACES)[2],
+            self._agreement.mm_per_pixel(pose),
+        )
+        return {
+            camera.name: (_pixels(camera, places), AROUND_MM / mm)
+            for camera, mm in zip(self._cameras, sizes, strict=True)
+        }
 
     def _look(
         self,
