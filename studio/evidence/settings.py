@@ -111,7 +111,7 @@ class EvidenceSettings:
         True,
         label="shadows may be doubted",
         help="What only one other camera sees as a shadow, and what none confirms, is neither subject nor background"
-        " where something above the floor may be there: it counts half, and no border is drawn at it.",
+        " where something above the floor may be there: it counts half.",
     )
     mask_darkest: int = next_frame_knob(
         128,
