@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from functools import partial
 
+import cv2
 import numpy as np
 import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
@@ -14,7 +15,8 @@ from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject
 from studio.evidence.distance_maps import silhouettes_by_camera
-from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.foundations.geometry.projection import project
 from studio.runs.search_space import default_sigma, search_space
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner, space_after
@@ -134,6 +136,26 @@ def test_an_arm_that_only_the_pictures_show_is_named_and_drawn_there(
     assert np.array_equal(drawn.carried.estimate, drawn.estimate.pose)
     again = FrameRefiner(body, CAMERAS, 7).refined(searched(pose), silhouettes, problem, SETTINGS, changes)
     assert np.array_equal(again.estimate.pose, drawn.estimate.pose)
+
+
+def test_what_no_arm_explains_moves_none(
+    body: BodyModel, truth: np.ndarray, evidence: FrameEvidence, problem: FrameLikelihood
+) -> None:
+    """A ball as thick as the trunk, in reach of the arm that lies along it."""
+    pose, folded = folded_away(body, truth, evidence)
+    views: list[ViewEvidence] = []
+    for camera, view in zip(CAMERAS, folded.views, strict=True):
+        ball = np.zeros_like(view.mask)
+        x, y = np.rint(project(camera, np.array([[350.0, 0.0, 1000.0]]))[0][0]).astype(int)
+        cv2.circle(ball, (int(x), int(y)), 45, (255,), -1)
+        views.append(dataclasses.replace(view, shadow=ball & ~view.mask))
+    seen = dataclasses.replace(folded, views=tuple(views))
+    refiner, silhouettes = FrameRefiner(body, CAMERAS, 7), partial(silhouettes_by_camera, seen)
+    alone = refiner.refined(searched(pose), silhouettes, problem, SETTINGS)
+    shown = refiner.refined(searched(pose), silhouettes, problem, SETTINGS, partial(changes_by_camera, seen))
+    assert shown.limbs_lost == ("left arm",)
+    assert shown.evaluations > alone.evaluations
+    assert np.array_equal(shown.estimate.pose, alone.estimate.pose)
 
 
 @pytest.mark.parametrize(
