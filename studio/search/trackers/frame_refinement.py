@@ -3,10 +3,10 @@
 The search finds the valley, the local descent (`refinement`) its minimum. Where the silhouettes show that a limb is off
 (`agreement`), that limb alone is resampled over its whole range. The samples are ranked by their disagreement with the
 silhouettes beyond what clothes explain, not by weight: a limb folded into the trunk weighs more than one that is nearly
-right. The best are refined, and one is taken where the silhouettes agree with it clearly better. Where the pictures show
-a limb elsewhere then (`limbs_elsewhere`), that limb is resampled on silhouettes that have what changed there, shadows
-too, by the same rule, and the pose is taken if fewer limbs are elsewhere with it. Tried without gain: draws that are
-bent towards those places by inverse kinematics. Areas where something stands in front of the body are left out
+right. The best are refined, and one is taken where the silhouettes agree with it clearly better. Where the pictures
+show a limb elsewhere then (`limbs_elsewhere`), that limb is resampled on silhouettes that have what changed there,
+shadows too, by the same rule, and the pose is taken if fewer limbs are elsewhere with it. Tried without gain: draws
+that are bent towards those places by inverse kinematics. Areas where something stands in front of the body are left out
 (`hidden_areas`).
 """
 
