@@ -5,11 +5,14 @@ import dataclasses
 import cv2
 import numpy as np
 import pytest
+from drawn_people import ring_of_cameras
 
 from studio.evidence.background import GaussianBackground
 from studio.evidence.masks import disc
 from studio.evidence.settings import EvidenceSettings
-from studio.foundations.arrays import Bytes
+from studio.foundations.arrays import Array, Bytes
+from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
 from studio.runs.setup import animal_masks
 from studio.runs.setup.animal_masks import darkest_shadow, unshaded, without_ghosts
 
@@ -105,3 +108,90 @@ def test_what_looks_like_the_subject_before_its_own_colour_is_unknown(learnt: "a
     assert before[body].mean() > 0.9
     assert before[~body].mean() < 0.05
     assert not animal_masks.unknown_pixels(picture, learnt).any()
+
+
+def test_a_tail_of_a_shadows_colour_is_kept_where_a_shadow_of_its_darkness_is_not(
+    learnt: "animal_masks.Learnt",
+) -> None:
+    picture, body, tail = with_animal(88, 7)
+    shade = np.clip(0.7 * floor().astype(float), 0, 255).astype(np.uint8)
+    grey = np.where(tail[..., None] > 0, shade, picture)
+    grey[118:143, 130:190] = shade[118:143, 130:190]
+    mask = animal_masks.with_thin_limbs(animal_masks.body_alone(grey, learnt), grey, learnt)
+    beyond = tail & ~np.asarray(cv2.dilate(body, disc(3)), np.uint8)
+    assert np.count_nonzero(mask & beyond) > 0.8 * np.count_nonzero(beyond)
+    assert (mask[118:143, 130:190] > 0).mean() < 0.05
+
+
+SIDES = tuple(
+    dataclasses.replace(camera, translation=camera.translation / 10.0)
+    for camera in ring_of_cameras(2, 200, 160)
+)
+"""Two that look at a hand's length of floor from two sides."""
+PLACE, BESIDE = np.array([20.0, 10.0, 0.0]), np.array([-70.0, -30.0, 0.0])
+"""mm, on the floor."""
+
+
+def disc_at(camera: Camera, place: Array, radius: float = 18.0) -> Bytes:
+    """(H, W) 255 where a camera sees a disc on the floor, or the same disc elsewhere."""
+    around = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    ring = place + radius * np.stack([np.cos(around), np.sin(around), np.zeros(60)], axis=1)
+    picture = np.zeros((camera.height, camera.width), np.uint8)
+    cv2.fillPoly(picture, [np.round(project(camera, ring)[0]).astype(np.int32)], 255)
+    return picture
+
+
+def seen_by_both(dark: Array, plain: Array) -> Bytes:
+    """What the first camera's dark disc is confirmed to be, where the second one sees a shadow."""
+    first, second = SIDES
+    names = [camera.name for camera in SIDES]
+    places = {
+        (first.name, second.name): animal_masks.on_the_floor(first, second),
+        (second.name, first.name): animal_masks.on_the_floor(second, first),
+    }
+    nothing = np.zeros((first.height, first.width), np.uint8)
+    shades = [(nothing, disc_at(first, dark)), (disc_at(second, plain), nothing)]
+    return animal_masks.confirmed_shadows(names, shades, places)[0]
+
+
+def test_a_camera_sees_the_floor_where_another_one_does() -> None:
+    first, second = SIDES
+    places = animal_masks.on_the_floor(first, second)
+    for place in (PLACE, BESIDE):
+        (column, row), there = project(first, place)[0], project(second, place)[0]
+        # Bilinear between the four pixels around: exact to a fraction of a pixel.
+        left, top = int(column), int(row)
+        across, down = column - left, row - top
+        near = places[top : top + 2, left : left + 2].astype(float)
+        weights = np.outer([1.0 - down, down], [1.0 - across, across])
+        np.testing.assert_allclose(np.einsum("ij,ijk->k", weights, near), there, atol=0.1)
+
+
+def test_a_shadow_as_dark_as_the_subject_is_one_where_another_camera_sees_a_shadow() -> None:
+    whole = np.count_nonzero(disc_at(SIDES[0], PLACE))
+    assert np.count_nonzero(seen_by_both(PLACE, PLACE)) > 0.9 * whole
+    assert not seen_by_both(PLACE, BESIDE).any()
+    # What stands 40 mm above the floor hides other places of it.
+    above = PLACE + np.array([0.0, 0.0, 40.0])
+    assert np.count_nonzero(seen_by_both(above, PLACE)) < 0.5 * whole
+
+
+def test_what_is_as_dark_as_the_subject_or_brighter_than_the_floor_is_no_shadow(
+    learnt: "animal_masks.Learnt",
+) -> None:
+    picture, body, _ = with_animal(88, 7)
+    deep = floor().astype(float)
+    deep[130:150, 200:260] *= 0.35
+    deep[130:150, 100:160] *= 1.5
+    picture = np.where(body[..., None] > 0, picture, np.clip(deep, 0, 255).astype(np.uint8))
+    _, dark = animal_masks.shades_of(picture, learnt)
+    inside = cv2.erode(body, disc(3)) > 0
+    assert dark[inside].mean() < 0.05 * 255
+    assert (dark[132:148, 202:258] > 0).mean() > 0.95
+    assert not dark[132:148, 102:158].any()
+    # It is darker than shadows are in this footage, so that a camera alone takes it for the subject.
+    alone = animal_masks.body_alone(picture, learnt)
+    told = animal_masks.body_alone(picture, learnt, dark)
+    assert (learnt.model.foreground(picture, learnt.settings).mask[132:148, 202:258] > 0).mean() > 0.9
+    assert not told[132:148, 202:258].any()
+    assert np.count_nonzero(told & body) > 0.97 * np.count_nonzero(alone & body)

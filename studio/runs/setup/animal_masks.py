@@ -6,11 +6,15 @@ know. And a tail is as wide as the noise that a clean-up removes. So, frame by f
 its empty picture:
 
 1. The body: what differs, but for all that is the background in a shade of its own colour, no darker than the shadows
-   of this footage: the brightness below which the subject begins is the valley of the shares of all pixels.
+   of this footage: the brightness below which the subject begins is the valley of the shares of all pixels. Under an
+   animal a camera that looks against the light sees shadow hardly lighter than fur, and of another colour where one of
+   several lights is missing. But a shadow lies on the floor (z = 0) for all cameras: where one sees it plainly, what is
+   darker than the background there, and lighter than the subject usually is, is that shadow to the others, too.
 2. Filled in: pixels of the subject's colour before a background of that colour, where the other views' hull lies.
 3. What the hull of all views does not reach is something else: litter, reflections in the floor or in glass.
 4. Thin limbs: ridges of what remains of the difference without its shadow, above what that is at most times, if they
-   lie in a chain that begins at the body.
+   lie in a chain that begins at the body. Those of a shadow's colour, such as a tail on grey steel, must be thinner and
+   stand out more.
 
 Lengths are in units of the subject's size in the picture, so that they mean the same at any resolution.
 """
@@ -20,6 +24,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from itertools import permutations
 
 import cv2
 import numpy as np
@@ -32,10 +37,12 @@ from studio.evidence.volume.hull import Hull
 from studio.evidence.volume.hull_settings import HullSettings
 from studio.evidence.volume.reconstruction import Reconstructor, check_views
 from studio.evidence.volume.tracking_space import Box
+from studio.footage.calibration.boards import rays_of
 from studio.footage.capture.footage import Footage
 from studio.foundations.arrays import Bytes, Floats, Mask
 from studio.foundations.errors import FootageError
 from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
 from studio.foundations.progress import Progress
 from studio.runs.setup.person_hull import covered, large_hull, person_box, spread_frames
 
@@ -45,8 +52,9 @@ LEARNT_FRAMES = 20
 """Frames from which colours, shadows and what changes all the time are learnt."""
 SUBJECT_SIDE = 50.0
 """Pixels, root of the area, of the subject for which the lengths below are given."""
-OPENED, CLOSED, THIN, GAP, LEAST_THIN = 1.0, 2.0, 4.0, 4.0, 14.0
-"""Radii of specks and of slits; half the width that thin limbs have at most; half a gap in their chain; its length."""
+OPENED, CLOSED, THIN, THIN_SHADE, GAP, LEAST_THIN = 1.0, 2.0, 4.0, 3.0, 4.0, 14.0
+"""Radii of specks and of slits; half the width that thin limbs have at most, and those of a shadow's colour; half a gap
+in their chain; its length."""
 SHADOW_COLOUR = 0.07
 """How far the colour of a shadow may lie from the background's: reflections in a floor are tinted."""
 OWN_COLOUR = 0.025
@@ -54,11 +62,17 @@ OWN_COLOUR = 0.025
 USUAL_DARKEST, LEAST_DARKEST, MOST_DARKEST = 0.4, 0.3, 0.6
 FEWEST_DARK = 0.2
 """Share of what differs that is darker than shadows where the subject is dark."""
+LIGHTER, QUARTILES = 2.0, 1.349
+"""Deviations above the subject's usual brightness from which on something may be a shadow that another camera sees; and
+those between the quartiles of normally distributed numbers."""
+ROUNDS = 2
+"""Shadows that others confirm confirm others so often."""
 LIKE, ALIKE, WIDEST = (2.0, 95.0), 1.4, 60.0
 """Percentiles of the subject's brightness that are its colour; by how much the background's may exceed them; and the
 largest range of them, grey levels, with which anything is filled in."""
-RIDGE, MOST_RIDGE, MOST_USUAL = 6.0, 40.0, 12.0
-"""Grey levels by which a thin limb stands out; more does not count; and at most is usual of a pixel."""
+RIDGE, SHADE_RIDGE, MOST_RIDGE, MOST_USUAL = 6.0, 12.0, 40.0, 12.0
+"""Grey levels by which a thin limb stands out, and one of a shadow's colour; more does not count; and at most is usual
+of a pixel."""
 SHAKEN = 1.0
 """Pixels by which a camera may have moved since its background was taken: so much of an edge there is no limb."""
 SELDOM, CHANGED = 15.0, 10.0
@@ -78,15 +92,18 @@ sees no upper half, a subject may be twice as high."""
 @dataclass(frozen=True, slots=True, eq=False)
 class Learnt:
     """What a camera's footage shows. model : its background. settings, own : masks without all shadows, and without
-    those of the background's very colour. colours : least and most brightness of the subject. usual : (H, W) of
-    `unshaded`. unit : pixels that a length of 1 has.
+    those of the background's very colour. lightest : brightness that the subject seldom exceeds. colours : least and
+    most brightness of the subject. usual : (H, W) of `unshaded`. usual_shade : (H, W) of what differs, shades too.
+    unit : pixels that a length of 1 has.
     """
 
     model: GaussianBackground
     settings: EvidenceSettings
     own: EvidenceSettings
+    lightest: float
     colours: tuple[float, float]
     usual: Floats
+    usual_shade: Floats
     unit: float
 
 
@@ -111,14 +128,17 @@ def animal_masks(
             )
         )
         views = list(zip(cameras, learnt, strict=True))
+        places = {(one.name, other.name): on_the_floor(one, other) for one, other in permutations(cameras, 2)}
         for frame in range(footage.frame_count):
             absent = footage.absent(frame)
             seeing = [(camera, one) for camera, one in views if camera.name not in absent]
             pictures = [footage.picture(camera.name, frame) for camera, _ in seeing]
-            masks = list(threads.map(body_alone, pictures, [one for _, one in seeing]))
+            shades = list(threads.map(shades_of, pictures, [one for _, one in seeing]))
+            shadows = confirmed_shadows([camera.name for camera, _ in seeing], shades, places)
+            masks = list(threads.map(body_alone, pictures, [one for _, one in seeing], shadows))
             if len(seeing) > 1:
                 masks = _by_all_views(masks, pictures, seeing, scale)
-            masks = list(threads.map(with_thin_limbs, masks, pictures, [one for _, one in seeing]))
+            masks = list(threads.map(with_thin_limbs, masks, pictures, [one for _, one in seeing], shadows))
             of_frame = {camera.name: mask for (camera, _), mask in zip(seeing, masks, strict=True)}
             for name in absent:
                 width, height = footage.size(name)
@@ -154,13 +174,20 @@ def learn(name: str, footage: Footage, backgrounds: Mapping[str, Bytes]) -> Lear
         [picture[core].max(axis=1) for picture, core in zip(pictures, cores, strict=True)]
     )
     low, high = np.percentile(brightness, LIKE) if len(brightness) else (0.0, 255.0)
+    first, middle, third = (
+        np.percentile(brightness, [25.0, 50.0, 75.0]) if len(brightness) else (0.0, 0.0, 0.0)
+    )
+    lightest = float(middle + LIGHTER * (third - first) / QUARTILES)
     darkest = settings.mask_shadow_darkest
     usual = np.median(
         [unshaded(picture, model.mean, model.gain(picture), darkest) for picture in pictures], axis=0
     )
     own = dataclasses.replace(settings, mask_shadow_colour=OWN_COLOUR)
     usual = np.minimum(1.3 * usual, MOST_USUAL) + SHAKEN * _steepness(model)
-    return Learnt(model, settings, own, (float(low), float(high)), usual.astype(np.float32), unit)
+    differs = np.median([_differences(one, model.mean, model.gain(one)) for one in pictures], axis=0)
+    usual_shade = np.minimum(1.3 * differs, MOST_USUAL) + SHAKEN * _steepness(model)
+    maps = usual.astype(np.float32), usual_shade.astype(np.float32)
+    return Learnt(model, settings, own, lightest, (float(low), float(high)), *maps, unit)
 
 
 def without_ghosts(background: Bytes, pictures: Sequence[Bytes]) -> Bytes:
@@ -233,12 +260,57 @@ def _share(model: GaussianBackground, picture: Bytes) -> Floats:
     return np.asarray(dot / np.maximum(np.square(expected).sum(axis=2), 1.0), dtype=np.float32)
 
 
-def body_alone(picture: Bytes, learnt: Learnt) -> Bytes:
-    """The mask of one view alone: the body, and thin pieces that touch it."""
+def on_the_floor(camera: Camera, other: Camera) -> Floats:
+    """(H, W, 2) pixels at which another camera sees the places of the floor that a camera's pixels see; -1 without."""
+    rows, columns = np.indices((camera.height, camera.width))
+    rays = rays_of(camera, np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float64))
+    centre = camera.centre
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = -centre[2] / rays[:, 2]
+        pixels, _ = project(other, centre + along[:, None] * rays)
+    pixels[~(along > 0.0)] = np.nan
+    found = np.nan_to_num(pixels, nan=-1.0, posinf=-1.0, neginf=-1.0).clip(-1.0, 1e4)
+    return found.reshape(camera.height, camera.width, 2).astype(np.float32)
+
+
+def shades_of(picture: Bytes, learnt: Learnt) -> tuple[Bytes, Bytes]:
+    """What passes for shadow in a picture (H, W), and what may be one where another camera sees it: what is lighter
+    than the subject and darker than its background in every colour, as one of several lights may be missing there.
+    """
+    seen = learnt.model.foreground(picture, learnt.settings)
+    darker = (picture <= learnt.model.mean * learnt.model.gain(picture)).all(axis=2)
+    lighter = _brightest(picture) > learnt.lightest
+    dark = np.where(darker & lighter, seen.mask | seen.shadow, np.uint8(0))
+    return _opened(seen.shadow, OPENED, learnt.unit), dark
+
+
+def confirmed_shadows(
+    names: Sequence[str], shades: Sequence[tuple[Bytes, Bytes]], places: Mapping[tuple[str, str], Floats]
+) -> list[Bytes]:
+    """(H, W) of each camera what may be shadow and lies on the floor where another camera sees one, or one that is
+    confirmed so. shades : of each (`shades_of`). places : `on_the_floor` of each two.
+    """
+    plain, found = [one for one, _ in shades], list[Bytes]()
+    for _ in range(ROUNDS):
+        found = []
+        for name, (_, dark) in zip(names, shades, strict=True):
+            seen = np.zeros_like(dark)
+            for other, shade in zip(names, plain, strict=True):
+                if other != name:
+                    seen |= cv2.remap(shade, places[name, other], None, cv2.INTER_NEAREST)
+            found.append(dark & seen)
+        plain = [one | more for one, more in zip(plain, found, strict=True)]
+    return found
+
+
+def body_alone(picture: Bytes, learnt: Learnt, shadow: Bytes | None = None) -> Bytes:
+    """The mask of one view alone: the body, and thin pieces that touch it. shadow : (H, W) what is none of it."""
     unit, model = learnt.unit, learnt.model
-    body = _closed(model.foreground(picture, learnt.settings).mask, CLOSED, unit)
-    body = _opened(body, OPENED, unit)
-    loose = model.foreground(picture, learnt.own).mask
+    seen, loose = (model.foreground(picture, one).mask for one in (learnt.settings, learnt.own))
+    if shadow is not None:
+        apart = cv2.bitwise_not(_opened(shadow, OPENED, unit))
+        seen, loose = seen & apart, loose & apart
+    body = _opened(_closed(seen, CLOSED, unit), OPENED, unit)
     thin = loose & ~np.asarray(cv2.dilate(_opened(loose, THIN, unit), disc(1)), np.uint8)
     both = body | thin
     joined = _closed(both, CLOSED, unit)
@@ -291,8 +363,10 @@ def _reached(mask: Bytes, hull: Hull | None, camera: Camera, unit: float) -> Byt
     return _opened(mask & near, OPENED, unit)
 
 
-def with_thin_limbs(mask: Bytes, picture: Bytes, learnt: Learnt) -> Bytes:
-    """A mask, its holes filled, with the thin limbs that begin at it."""
+def with_thin_limbs(mask: Bytes, picture: Bytes, learnt: Learnt, shadow: Bytes | None = None) -> Bytes:
+    """A mask, its holes filled, with the thin limbs that begin at it. shadow : (H, W) what is none of them, unless it
+    is a ridge of a shadow's colour.
+    """
     unit, gap = learnt.unit, _pixels(GAP, learnt.unit)
     left, top, width, height = cv2.boundingRect(mask)
     if not width:
@@ -304,12 +378,15 @@ def with_thin_limbs(mask: Bytes, picture: Bytes, learnt: Learnt) -> Bytes:
         cleaned(mask[part], dataclasses.replace(learnt.settings, mask_fill_holes=_pixels(HOLE, unit * unit))),
     )
     darkest = learnt.settings.mask_shadow_darkest
-    differs = unshaded(picture[part], learnt.model.mean[part], learnt.model.gain(picture), darkest)
-    differs = np.maximum(np.minimum(differs, MOST_RIDGE) - learnt.usual[part], 0.0)
-    ridges = differs - np.asarray(
-        cv2.morphologyEx(differs, cv2.MORPH_OPEN, disc(_pixels(THIN, unit))), np.float32
-    )
-    found = np.where((ridges > RIDGE) & (cv2.dilate(mask, disc(1)) == 0), np.uint8(255), np.uint8(0))
+    behind, gain = learnt.model.mean[part], learnt.model.gain(picture)
+    differs = _unusual(unshaded(picture[part], behind, gain, darkest), learnt.usual[part])
+    if shadow is not None:
+        differs = np.where(shadow[part] > 0, np.float32(0.0), differs)
+    shaded = _unusual(_differences(picture[part], behind, gain), learnt.usual_shade[part])
+    dark = _ridges(shaded, THIN_SHADE * unit) > SHADE_RIDGE
+    above = dark | (_ridges(differs, THIN * unit) > RIDGE)
+    differs = np.maximum(differs, np.where(dark, shaded, np.float32(0.0)))
+    found = np.where(above & (cv2.dilate(mask, disc(1)) == 0), np.uint8(255), np.uint8(0))
     found = _longer(found, 0.4 * LEAST_THIN * unit)
     chained = found & _touching(np.asarray(cv2.dilate(found | mask, disc(gap)), np.uint8), mask)
     wide = np.asarray(cv2.dilate(chained, disc(gap)), np.uint8)
@@ -319,6 +396,23 @@ def with_thin_limbs(mask: Bytes, picture: Bytes, learnt: Learnt) -> Bytes:
     bridges = np.where((differs > 0.5 * RIDGE) & (line > 0) & (near > 0), np.uint8(255), np.uint8(0))
     whole[part] = mask | chained | bridges
     return whole
+
+
+def _unusual(differs: Floats, usual: Floats) -> Floats:
+    """(H, W) by how much more than usual pixels differ."""
+    return np.maximum(np.minimum(differs, MOST_RIDGE) - usual, 0.0)
+
+
+def _ridges(differs: Floats, radius: float) -> Floats:
+    """(H, W) of what differs that which is thinner than twice a radius, pixels."""
+    opened = cv2.morphologyEx(differs, cv2.MORPH_OPEN, disc(_pixels(1.0, radius)))
+    return differs - np.asarray(opened, np.float32)
+
+
+def _differences(picture: Bytes, background: Levels, gain: Floats) -> Floats:
+    """(H, W) grey levels by which a picture differs from its background, shades too."""
+    blurred = cv2.GaussianBlur(picture, (3, 3), 0.8).astype(np.float32)
+    return np.sqrt(np.square(blurred - background.astype(np.float32) * gain).sum(axis=2))
 
 
 def _brightest(picture: Levels) -> Levels:
