@@ -26,7 +26,7 @@ from studio.evidence.volume.alignment import root_parameters, with_root_at
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
-from studio.search.trackers.agreement import Agreement, Disagreement
+from studio.search.trackers.agreement import LEAST_AREA, Agreement, Disagreement
 from studio.search.trackers.hidden_areas import learnt, without_hidden
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
 from studio.search.trackers.limbs_elsewhere import Change, LimbsElsewhere, lost_of
@@ -274,10 +274,11 @@ def redrawn(
     are resampled first, however little they disagree: what a lost limb leaves bare may be nearer to another one.
     """
     evaluations, tried, began_with = 0, set[str](), found
+    chains = _chains(frame.refiner)
     if last is not None:
         found = frame.better(found, last)
     while True:
-        shares = found.off.shares()
+        shares = _doubts(found.off, chains)
         doubtful = [
             name
             for name in shares
@@ -288,7 +289,7 @@ def redrawn(
         limb = max(doubtful, key=lambda name: (name in elsewhere, shares[name]))
         tried.add(limb)
         own = bent_by(frame.refiner, limb)
-        if len(own) > MOST_TOGETHER and has_tail(frame.refiner.body):
+        if limb in chains:
             drawn, weighed = drawn_along(rng, frame, found.pose, own)
             found = frame.best_of(found, drawn, own, BETTER_CHAIN)
             evaluations += weighed
@@ -305,6 +306,26 @@ def redrawn(
         found, more = _both_redrawn(rng, found, frame, limb)
         evaluations += more
     return found if found is began_with else frame.refine(found), evaluations
+
+
+def _chains(refiner: Refiner) -> list[str]:
+    """Limbs that are drawn joint by joint: those of more angles than are drawn at once, of a body with a tail."""
+    if not has_tail(refiner.body):
+        return []
+    limbs = dict.fromkeys(entry.limb for entry in refiner.body.parameters)
+    return [limb for limb in limbs if len(bent_by(refiner, limb)) > MOST_TOGETHER]
+
+
+def _doubts(off: Disagreement, chains: Sequence[str]) -> dict[str, float]:
+    """Disagreeing area by limb, as a share of its own. A chain that lies before the body disagrees with nothing, and
+    what it leaves bare is nearest to a limb that it hangs from: all that is bare may be a chain's.
+    """
+    shares, groups = off.shares(), np.array(off.limbs)
+    for limb in chains:
+        own = groups == limb
+        area = np.maximum(off.area.sum(axis=0), LEAST_AREA)[own].sum()
+        shares[limb] = max(shares[limb], float((off.outside[:, own].sum() + off.bare.sum()) / area))
+    return shares
 
 
 def _both_redrawn(

@@ -277,6 +277,30 @@ def test_a_lost_tail_is_drawn_along_and_then_with_the_body_turned_round(
         assert frame.asked == [("best of", ("tail",), 1, 0.97)]
 
 
+def test_a_tail_that_disagrees_with_nothing_is_drawn_where_others_leave_something_bare(
+    tailed: Refiner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It lies before the body; where it should be, the rump is the nearest limb."""
+    turns: list[float] = []
+    monkeypatch.setattr(frames, "_turned_round", lambda rng, found, frame, own: turns.append(found.loss))
+    monkeypatch.setattr(frames, "drawn_along", lambda rng, frame, pose, own: (pose[None], 100))
+    neutral = tailed.body.neutral
+    hidden = with_pose(hypothesis(9.0, tail=0.0, root=0.029, head=0.002), neutral)
+    frame = Told(tailed.body, tailed, {"tail": with_pose(hypothesis(4.0, tail=0.0, root=0.0), neutral)})
+    found, weighed = frames.redrawn(np.random.default_rng(0), hidden, frame)
+    assert (found.loss, weighed) == (4.0, 100)
+    assert frame.asked[0] == ("best of", ("tail",), 1, 0.97)
+    # A tail that itself agrees is no reason to turn the body round.
+    assert not turns
+    # What others cover outside is not the tail's, nor does a body without one look for it.
+    off = hypothesis(9.0, tail=0.0, root=0.5).off
+    outside = dataclasses.replace(off, outside=off.bare, bare=off.outside)
+    assert frames._doubts(outside, ["tail"]) == {"tail": 0.0, "root": 0.5}
+    assert frames._doubts(off, []) == {"tail": 0.0, "root": 0.5}
+    # 5000 mm² are bare, and the tail has 10 000.
+    assert frames._doubts(off, ["tail"]) == {"tail": 0.5, "root": 0.5}
+
+
 def test_another_pose_is_taken_below_its_share_of_the_loss() -> None:
     losses = {1.0: 8.49, 2.0: 8.5, 3.0: 9.69, 4.0: 9.7}
     seen = SeenFrame(
