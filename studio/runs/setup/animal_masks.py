@@ -135,6 +135,7 @@ def animal_masks(
             pictures = [footage.picture(camera.name, frame) for camera, _ in seeing]
             shades = list(threads.map(shades_of, pictures, [one for _, one in seeing]))
             shadows = confirmed_shadows([camera.name for camera, _ in seeing], shades, places)
+            shadows = [_opened(one, CLOSED, own.unit) for one, (_, own) in zip(shadows, seeing, strict=True)]
             masks = list(threads.map(body_alone, pictures, [one for _, one in seeing], shadows))
             if len(seeing) > 1:
                 masks = _by_all_views(masks, pictures, seeing, scale)
@@ -308,7 +309,7 @@ def body_alone(picture: Bytes, learnt: Learnt, shadow: Bytes | None = None) -> B
     unit, model = learnt.unit, learnt.model
     seen, loose = (model.foreground(picture, one).mask for one in (learnt.settings, learnt.own))
     if shadow is not None:
-        apart = cv2.bitwise_not(_opened(shadow, OPENED, unit))
+        apart = cv2.bitwise_not(shadow)
         seen, loose = seen & apart, loose & apart
     body = _opened(_closed(seen, CLOSED, unit), OPENED, unit)
     thin = loose & ~np.asarray(cv2.dilate(_opened(loose, THIN, unit), disc(1)), np.uint8)
