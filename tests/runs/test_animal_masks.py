@@ -143,28 +143,28 @@ def disc_at(camera: Camera, place: Array, radius: float = 18.0) -> Bytes:
 
 def seen_by_both(dark: Array, plain: Array) -> Bytes:
     """What the first camera's dark disc is confirmed to be, where the second one sees a shadow."""
-    first, second = SIDES
-    names = [camera.name for camera in SIDES]
-    places = {
-        (first.name, second.name): animal_masks.on_the_floor(first, second),
-        (second.name, first.name): animal_masks.on_the_floor(second, first),
-    }
-    nothing = np.zeros((first.height, first.width), np.uint8)
-    shades = [(nothing, disc_at(first, dark)), (disc_at(second, plain), nothing)]
-    return animal_masks.confirmed_shadows(names, shades, places)[0]
+    nothing = np.zeros((SIDES[0].height, SIDES[0].width), np.uint8)
+    shades = [(nothing, disc_at(SIDES[0], dark)), (disc_at(SIDES[1], plain), nothing)]
+    return animal_masks.confirmed_shadows(SIDES, shades)[0]
 
 
-def test_a_camera_sees_the_floor_where_another_one_does() -> None:
-    first, second = SIDES
-    places = animal_masks.on_the_floor(first, second)
-    for place in (PLACE, BESIDE):
-        (column, row), there = project(first, place)[0], project(second, place)[0]
-        # Bilinear between the four pixels around: exact to a fraction of a pixel.
-        left, top = int(column), int(row)
-        across, down = column - left, row - top
-        near = places[top : top + 2, left : left + 2].astype(float)
-        weights = np.outer([1.0 - down, down], [1.0 - across, across])
-        np.testing.assert_allclose(np.einsum("ij,ijk->k", weights, near), there, atol=0.1)
+def test_a_pixel_sees_the_floor_where_its_ray_ends_and_none_above_the_horizon() -> None:
+    camera = SIDES[0]
+    pixels = np.round(project(camera, np.stack([PLACE, BESIDE]))[0]).astype(np.int64)
+    places = animal_masks.places_on_floor(camera, pixels)
+    np.testing.assert_allclose(places[:, 2], 0.0, atol=1e-9)
+    # A pixel is some 4 mm of the floor.
+    np.testing.assert_allclose(project(camera, places)[0], pixels, atol=1e-6)
+    np.testing.assert_allclose(places, [PLACE, BESIDE], atol=8.0)
+    # Level, 100 mm above the floor, looking along x: 45 degrees below the horizon lies what is 100 mm ahead.
+    ahead = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    lens = np.array([[50.0, 0.0, 100.0], [0.0, 50.0, 80.0], [0.0, 0.0, 1.0]])
+    level = dataclasses.replace(
+        camera, rotation=ahead, translation=-ahead @ [0.0, 0.0, 100.0], matrix=lens, distortion=np.zeros(5)
+    )
+    below, above = animal_masks.places_on_floor(level, np.array([[100, 130], [100, 30]]))
+    np.testing.assert_allclose(below, [100.0, 0.0, 0.0], atol=1e-9)
+    assert np.isnan(above).all()
 
 
 def test_a_shadow_as_dark_as_the_subject_is_one_where_another_camera_sees_a_shadow() -> None:

@@ -24,7 +24,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from itertools import permutations
 
 import cv2
 import numpy as np
@@ -39,10 +38,10 @@ from studio.evidence.volume.reconstruction import Reconstructor, check_views
 from studio.evidence.volume.tracking_space import Box
 from studio.footage.calibration.boards import rays_of
 from studio.footage.capture.footage import Footage
-from studio.foundations.arrays import Bytes, Floats, Mask
+from studio.foundations.arrays import Array, Bytes, Floats, Indices, Mask
 from studio.foundations.errors import FootageError
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.geometry.projection import project
+from studio.foundations.geometry.projection import nearest_pixels
 from studio.foundations.progress import Progress
 from studio.runs.setup.person_hull import covered, large_hull, person_box, spread_frames
 
@@ -128,13 +127,12 @@ def animal_masks(
             )
         )
         views = list(zip(cameras, learnt, strict=True))
-        places = {(one.name, other.name): on_the_floor(one, other) for one, other in permutations(cameras, 2)}
         for frame in range(footage.frame_count):
             absent = footage.absent(frame)
             seeing = [(camera, one) for camera, one in views if camera.name not in absent]
             pictures = [footage.picture(camera.name, frame) for camera, _ in seeing]
             shades = list(threads.map(shades_of, pictures, [one for _, one in seeing]))
-            shadows = confirmed_shadows([camera.name for camera, _ in seeing], shades, places)
+            shadows = confirmed_shadows([camera for camera, _ in seeing], shades)
             shadows = [_opened(one, CLOSED, own.unit) for one, (_, own) in zip(shadows, seeing, strict=True)]
             masks = list(threads.map(body_alone, pictures, [one for _, one in seeing], shadows))
             if len(seeing) > 1:
@@ -261,17 +259,12 @@ def _share(model: GaussianBackground, picture: Bytes) -> Floats:
     return np.asarray(dot / np.maximum(np.square(expected).sum(axis=2), 1.0), dtype=np.float32)
 
 
-def on_the_floor(camera: Camera, other: Camera) -> Floats:
-    """(H, W, 2) pixels at which another camera sees the places of the floor that a camera's pixels see; -1 without."""
-    rows, columns = np.indices((camera.height, camera.width))
-    rays = rays_of(camera, np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float64))
-    centre = camera.centre
+def places_on_floor(camera: Camera, pixels: Indices) -> Array:
+    """(K, 3) mm, the places of the floor z = 0 that pixels (K, 2) of a camera see; NaN where they see none."""
+    rays, centre = rays_of(camera, pixels.astype(np.float64)), camera.centre
     with np.errstate(divide="ignore", invalid="ignore"):
         along = -centre[2] / rays[:, 2]
-        pixels, _ = project(other, centre + along[:, None] * rays)
-    pixels[~(along > 0.0)] = np.nan
-    found = np.nan_to_num(pixels, nan=-1.0, posinf=-1.0, neginf=-1.0).clip(-1.0, 1e4)
-    return found.reshape(camera.height, camera.width, 2).astype(np.float32)
+    return centre + np.where(along > 0.0, along, np.nan)[:, None] * rays
 
 
 def shades_of(picture: Bytes, learnt: Learnt) -> tuple[Bytes, Bytes]:
@@ -285,21 +278,25 @@ def shades_of(picture: Bytes, learnt: Learnt) -> tuple[Bytes, Bytes]:
     return _opened(seen.shadow, OPENED, learnt.unit), dark
 
 
-def confirmed_shadows(
-    names: Sequence[str], shades: Sequence[tuple[Bytes, Bytes]], places: Mapping[tuple[str, str], Floats]
-) -> list[Bytes]:
+def confirmed_shadows(cameras: Sequence[Camera], shades: Sequence[tuple[Bytes, Bytes]]) -> list[Bytes]:
     """(H, W) of each camera what may be shadow and lies on the floor where another camera sees one, or one that is
-    confirmed so. shades : of each (`shades_of`). places : `on_the_floor` of each two.
+    confirmed so. shades : of each (`shades_of`).
     """
-    plain, found = [one for one, _ in shades], list[Bytes]()
+    plain, found = [one for one, _ in shades], [np.zeros_like(one) for one, _ in shades]
+    pixels = [np.argwhere(dark)[:, ::-1] for _, dark in shades]
+    others = [
+        [
+            (number, *nearest_pixels(other, places_on_floor(camera, own)))
+            for number, other in enumerate(cameras)
+            if other is not camera and len(own)
+        ]
+        for camera, own in zip(cameras, pixels, strict=True)
+    ]
     for _ in range(ROUNDS):
-        found = []
-        for name, (_, dark) in zip(names, shades, strict=True):
-            seen = np.zeros_like(dark)
-            for other, shade in zip(names, plain, strict=True):
-                if other != name:
-                    seen |= cv2.remap(shade, places[name, other], None, cv2.INTER_NEAREST)
-            found.append(dark & seen)
+        for mask, own, elsewhere in zip(found, pixels, others, strict=True):
+            for number, near, there in elsewhere:
+                seen = own[there][plain[number][near[there, 1], near[there, 0]] > 0]
+                mask[seen[:, 1], seen[:, 0]] = 255
         plain = [one | more for one, more in zip(plain, found, strict=True)]
     return found
 
