@@ -306,8 +306,7 @@ def body_alone(picture: Bytes, learnt: Learnt, shadow: Bytes | None = None) -> B
     unit, model = learnt.unit, learnt.model
     seen, loose = (model.foreground(picture, one).mask for one in (learnt.settings, learnt.own))
     if shadow is not None:
-        apart = cv2.bitwise_not(shadow)
-        seen, loose = seen & apart, loose & apart
+        seen, loose = seen & ~shadow, loose & ~shadow
     body = _opened(_closed(seen, CLOSED, unit), OPENED, unit)
     thin = loose & ~np.asarray(cv2.dilate(_opened(loose, THIN, unit), disc(1)), np.uint8)
     both = body | thin
