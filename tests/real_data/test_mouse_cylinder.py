@@ -26,8 +26,15 @@ pytestmark = [pytest.mark.slow, pytest.mark.real_data, pytest.mark.timeout(1500)
 
 REARED, WALKING = 6, 323
 MASKS, START_MM, OVERLAP = 0.88, 20.0, 0.74
-TRACKED_MM = {REARED: 10.0, WALKING: 20.0}
-"""The goals of issue 29 are 6 mm for the trunk's points and 10 for limbs; these are what is reached, and a margin."""
+START_MEAN_MM, TRACKED_MM = {REARED: 10.0, WALKING: 17.0}, {REARED: 12.0, WALKING: 12.0}
+"""Means of what has a name below. The goals of issue 29 are 6 mm for the trunk's and head's points and 10 for limbs.
+Reached from nothing: 6 to 8 and 12 to 15 mm (five seeds), tracked 9.2 and 8.3. The body's pose that is nearest to the
+labels is 4.2 and 4.1 mm off; refined from there on the masks, which lack feet that stand in the shadow, 5.2 and 7.8:
+that much is the body and the masks, the rest the search. A reared body that is turned by 70 degrees about itself, ears
+21 and 27 mm off, does not keep these bounds.
+"""
+AHEAD = 0.5
+"""Least cosine between where the body points in a frame and in the next: 0.83 is reached; a turn makes it negative."""
 NAMES = {
     "EarL": "Ear_L", "EarR": "Ear_R", "Snout": "Nose", "SpineF": "Neck", "SpineM": "Trunk", "TailBase": "TTI",
     "HindpawL": "Hindpaw_left", "HindpawR": "Hindpaw_right", "HindlimbL": "Ankle_left", "HindlimbR": "Ankle_right",
@@ -106,6 +113,7 @@ def test_it_starts_right_from_nothing(
     off = errors(workflow.session, None, start.pose, labels[frame])
     print(frame, round(start.confidence, 3), {name: round(value, 1) for name, value in off.items()})
     assert max(off[name] for name in ("Nose", "Neck", "Trunk", "TTI")) < START_MM
+    assert float(np.mean(list(off.values()))) < START_MEAN_MM[frame]
     assert start.confidence > 0.5
 
 
@@ -118,3 +126,14 @@ def test_it_is_tracked_to_the_end(workflow: Workflow, labels: dict[int, dict[str
         print(frame, {name: round(value, 1) for name, value in off.items()})
         assert float(np.mean(list(off.values()))) < TRACKED_MM[frame]
     assert float(np.nanmean(track.confidence)) > OVERLAP
+
+
+def test_it_is_never_turned_round(workflow: Workflow) -> None:
+    track, body = studio.read_track(workflow.run, "best"), workflow.run.body()
+    names = [marker.name for marker in body.markers]
+    points = marker_points(body, track.poses)
+    along = points[:, names.index("Nose")] - points[:, names.index("TTI")]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    turns = np.einsum("ni,ni->n", along[1:], along[:-1])
+    print(round(float(turns.min()), 2), "in frame", int(track.frames[1 + turns.argmin()]))
+    assert float(turns.min()) > AHEAD
