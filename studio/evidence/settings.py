@@ -105,8 +105,8 @@ class EvidenceSettings:
         help="A shadow on the floor is as dark for every camera: what differs by more than about this share from what"
         " the others see there is none. 0 = it is not asked.",
     )
-    # The same twelve people, body called background: 4.3 % without, 3.0 with it (worst 10.4 and 7.8), 0.6 neither; of
-    # shadows 0.4 and 0.5 % called body, 2.8 neither. Two clips of others, tracked: 15.1 and 16.5 mm, 14.5 and 15.5.
+    # The same twelve people, body called background: 4.3 % without, 3.1 with it (worst 10.4 and 7.9), 0.6 neither; of
+    # shadows 0.4 and 0.5 % called body, 0.9 neither. Two clips of others, tracked: 15.1 and 16.5 mm, 16.0 and 16.2.
     mask_shadow_doubt: bool = next_frame_knob(
         True,
         label="shadows may be doubted",
