@@ -380,8 +380,7 @@ def with_thin_limbs(mask: Bytes, picture: Bytes, learnt: Learnt, shadow: Bytes |
     if shadow is not None:
         differs = np.where(shadow[part] > 0, np.float32(0.0), differs)
     shaded = _unusual(_differences(picture[part], behind, gain), learnt.usual_shade[part])
-    standing_out = np.where(_ridges(shaded, THIN_SHADE * unit) > SHADE_RIDGE, np.uint8(255), np.uint8(0))
-    dark = _longer(standing_out, LEAST_THIN * unit) > 0
+    dark = _ridges(shaded, THIN_SHADE * unit) > SHADE_RIDGE
     above = dark | (_ridges(differs, THIN * unit) > RIDGE)
     differs = np.maximum(differs, np.where(dark, shaded, np.float32(0.0)))
     found = np.where(above & (cv2.dilate(mask, disc(1)) == 0), np.uint8(255), np.uint8(0))
