@@ -33,8 +33,10 @@ labels is 4.2 and 4.1 mm off; refined from there on the masks, which lack feet t
 that much is the body and the masks, the rest the search. A reared body that is turned by 70 degrees about itself, ears
 21 and 27 mm off, does not keep these bounds.
 """
-AHEAD = 0.5
-"""Least cosine between where the body points in a frame and in the next: 0.83 is reached; a turn makes it negative."""
+AHEAD = 0.0
+"""Least cosine between where the body points in a frame and in the next: 0.46 and 0.83 are reached; half a turn makes
+it negative.
+"""
 NAMES = {
     "EarL": "Ear_L", "EarR": "Ear_R", "Snout": "Nose", "SpineF": "Neck", "SpineM": "Trunk", "TailBase": "TTI",
     "HindpawL": "Hindpaw_left", "HindpawR": "Hindpaw_right", "HindlimbL": "Ankle_left", "HindlimbR": "Ankle_right",
