@@ -77,14 +77,14 @@ def made(session: Session, folder: Path, tmp_path_factory: pytest.TempPathFactor
     return studio.body_from_film(session, path, like=str(guess.file), frames=CLICKED)
 
 
-def test_every_length_is_told_and_alike_from_frame_to_frame(made: FilmedBody) -> None:
+def test_every_length_is_decided_and_alike_from_frame_to_frame(made: FilmedBody) -> None:
     sizes = {size.name: size for size in made.sizes}
     shipped = studio.edit_body("fly48").body.dimensions
     for name in GUESSED:
         print(
             f"{name:22} {sizes[name].after:5.1f} ± {sizes[name].deviation:.1f}, all 15 frames {shipped[name]:5.1f}"
         )
-        assert sizes[name].told
+        assert sizes[name].decided
         assert sizes[name].after == pytest.approx(shipped[name], rel=0.05)
     scatter = {limb.limb: limb.scatter / limb.mean for limb in made.limbs}
     print({name: round(share, 3) for name, share in scatter.items()})

@@ -147,7 +147,8 @@ def test_background_subtraction_leaves_holes_and_shadows(cameras: tuple[Camera, 
     assert 0.85 < np.mean(shares) < 0.94
     assert min(shares) > 0.78
     assert 0.02 < np.mean(missing) < 0.12
-    assert 0.02 < np.mean(extra) < 0.12
+    # 0.013 today, as a shadow's colour is judged over five pixels; 0.02 and more when each pixel stood alone.
+    assert 0.005 < np.mean(extra) < 0.12
 
 
 def _on_start_pose(data: Path, bones: Skeleton) -> PersonMotion:
