@@ -83,10 +83,9 @@ def _with_spots(view: ViewEvidence, pixels: Indices, radius: float) -> ViewEvide
     near = np.zeros_like(view.mask)
     for at in pixels:
         cv2.circle(near, (int(at[0]), int(at[1])), max(1, round(radius)), (255,), -1)
-    nothing = np.zeros_like(near)
-    near &= (nothing if view.shadow is None else view.shadow) | (
-        nothing if view.unknown is None else view.unknown
-    )
+    # What the mask has already adds nothing.
+    shadow, doubted = (view.mask if one is None else one for one in (view.shadow, view.unknown))
+    near &= shadow | doubted
     unknown = None if view.unknown is None else view.unknown & ~near
     return replace(view, mask=view.mask | near, unknown=unknown)
 

@@ -197,8 +197,10 @@ class FloorShadows:
             elif counts[most] < at_zero:
                 scene[0, 2] = 0.0
         scene[0, 2] += (ABOVE if tolerance else CLEARLY_ABOVE) * self._distance
-        for number, (own, cells) in enumerate(zip(like, seen, strict=True)):
-            explained[owners == number] = _settled(explained[owners == number], own, cells.kinds.shape)
+        if doubts:
+            for number, (own, cells) in enumerate(zip(like, seen, strict=True)):
+                mine = owners == number
+                explained[mine] = _settled(explained[mine], own, cells.kinds.shape)
         certain = explained == LIES_THERE
         places = lowest_changed(
             everything, maps, self._views, owners, rays, certain, scene, STEP * self._distance, least

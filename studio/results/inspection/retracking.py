@@ -99,7 +99,7 @@ class Retracking:
             partial(silhouettes_by_camera, evidence),
             self._problems[frame],
             settings.refinement,
-            lambda: changes_by_camera(evidence),
+            partial(changes_by_camera, evidence),
         )
 
 

@@ -169,8 +169,8 @@ class FrameRefiner:
             last = result.carried.previous_estimate
             found, more = redrawn(rng, began_with, seen_frame, last, elsewhere=named)
             evaluations += more
-            then = witness.of(found.pose, changed, memory)
-            if found is not began_with and len(lost_of(then)) < len(named):
+            then = elsewhere if found is began_with else witness.of(found.pose, changed, memory)
+            if len(lost_of(then)) < len(named):
                 pose, off, masks, silhouettes, elsewhere = found.pose, found.off, shown, without, then
         weight = float(problem.log_likelihood(pose[None])[0])
         estimate = dataclasses.replace(result.estimate, pose=pose, searched=start, log_weight=weight)

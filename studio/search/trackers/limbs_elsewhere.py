@@ -175,10 +175,8 @@ class LimbsElsewhere:
         elsewhere. Others : as of `of`.
         """
         reaches = np.where([limb in limbs for limb in self._limbs], self._reaches, 0.0)
-        places, sizes = (
-            self._look(pose, changed, memory, reaches, MOST_PLACES)[2],
-            self._agreement.mm_per_pixel(pose),
-        )
+        _, _, places = self._look(pose, changed, memory, reaches, MOST_PLACES)
+        sizes = self._agreement.mm_per_pixel(pose)
         return {
             camera.name: (_pixels(camera, places), AROUND_MM / mm)
             for camera, mm in zip(self._cameras, sizes, strict=True)
