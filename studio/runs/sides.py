@@ -29,6 +29,7 @@ from studio.runs.tracks import (
     track_digest,
     write_track,
 )
+from studio.search.trackers.frame_refinement import descent
 from studio.search.trackers.hidden_areas import without_hidden
 from studio.search.trackers.limb_bridging import with_limbs_bridged
 from studio.search.trackers.loss_detection import Onlooker
@@ -55,7 +56,11 @@ def correct_clip(
     if known := corrections_of(run):
         return known
     track = read_track(run, RAW)
-    evidence = partial(_look_at, problems, MaskSettings(run), read)
+    settings = MaskSettings(run)
+    evidence, how = (
+        partial(_look_at, problems, settings, read),
+        descent(settings.of(run.record.first).refinement),
+    )
     body, cameras, poses = problems.body, problems.cameras, dict(zip(track.frames, track.poses, strict=True))
     with run.results() as results:
 
@@ -69,9 +74,9 @@ def correct_clip(
         ]
         fps = run.record.fps
         bridged, bridges = with_limbs_bridged(
-            body, cameras, track.frames, track.poses, named, fps, silhouettes_of
+            body, cameras, track.frames, track.poses, named, fps, silhouettes_of, how
         )
-        corrected, changes = with_sides_right(body, cameras, track.frames, bridged, fps, silhouettes_of)
+        corrected, changes = with_sides_right(body, cameras, track.frames, bridged, fps, silhouettes_of, how)
     words = (*(bridge.words for bridge in bridges), *(change.words for change in changes))
     if not words:
         drop_track(run, SIDES)

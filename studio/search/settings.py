@@ -26,6 +26,7 @@ RENAMED: dict[str, tuple[str, dict[object, Value]]] = {"limits": ("constraints",
 # Knobs that older records do not have, as those runs were tracked.
 BEFORE: dict[str, Value] = {
     "refine_frames": False,
+    "above_floor": False,
     "mask_shadow_window": 1,
     "mask_shadow_floor": False,
     "mask_shadow_alike": 0.0,

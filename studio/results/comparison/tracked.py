@@ -37,7 +37,7 @@ from studio.search.likelihood.devices import CPU, DEVICE_KNOB
 from studio.search.likelihood.hard_priors import HardPriors
 from studio.search.settings import RunSettings, changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS
-from studio.search.trackers.frame_refinement import FrameRefiner
+from studio.search.trackers.frame_refinement import FrameRefiner, descent
 from studio.search.trackers.limb_bridging import with_limbs_bridged
 from studio.search.trackers.refinement import Distances
 from studio.search.trackers.side_exchange import with_sides_right
@@ -184,7 +184,8 @@ def track_seeds(
     if trial.shape_frames and start is not None:
         sigma, first = session_sigma(session, body, rate), frames[: trial.shape_frames]
         of_shape = partial(evidence, name=WEIGHTING)
-        shaped = shaped_body(body, seen_with, of_shape, first, np.array(start), sigma)
+        on_floor = settings.refinement.above_floor
+        shaped = shaped_body(body, seen_with, of_shape, first, np.array(start), sigma, above_floor=on_floor)
         body, start = shaped.body, tuple(float(value) for value in shaped.start)
     sigma = session_sigma(session, body, rate) * trial.sigma_scale
     space = search_space(body, sigma, _behaviour(session, body, settings, trial))
@@ -234,8 +235,9 @@ def track_seeds(
                 return known_silhouettes(body, seen_with, evidence(frame), poses[row], run.memories[row])
 
             rows = np.array(frames)
-            poses = with_limbs_bridged(body, seen_with, rows, poses, lost, rate, silhouettes_of)[0]
-            poses = with_sides_right(body, seen_with, rows, poses, rate, silhouettes_of)[0]
+            how = descent(settings.refinement)
+            poses = with_limbs_bridged(body, seen_with, rows, poses, lost, rate, silhouettes_of, how)[0]
+            poses = with_sides_right(body, seen_with, rows, poses, rate, silhouettes_of, how)[0]
         figures = measured(session, body, poses, np.array(frames), evaluations, seconds / len(runs))
         by_frame = dict(zip(frames, lost, strict=True))
         impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())

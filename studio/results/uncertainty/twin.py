@@ -417,6 +417,7 @@ def _shaped(
         frames[:FIRST_FRAMES],
         np.array(record.start_pose),
         np.array(record.sigma),
+        above_floor=recorded.refinement.above_floor,
         progress=lambda step, done, total: progress(f"{step} of the twin", done, total),
     )
     before, after = shape.overlap

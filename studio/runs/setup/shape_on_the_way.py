@@ -138,6 +138,7 @@ def _fitted_now(
             frames,
             start,
             session_sigma(session, body, fps),
+            above_floor=settings.refinement.above_floor,
             progress=progress,
         )
     before, after = shape.overlap
@@ -158,12 +159,16 @@ def shaped_body(
     start: Array,
     sigma: Array,
     *,
+    above_floor: bool = True,
     progress: Progress = no_progress,
 ) -> FittedShape:
     """The shape of a body in the first frames. evidence : of a frame, with edge proximity maps. start : (D,) of
-    the first of `frames`. sigma : (D,) σ0 from frame to frame.
+    the first of `frames`. sigma : (D,) σ0 from frame to frame. above_floor : as in `ShapeRefiner`.
     """
-    rules = default_settings(TRACKER, WEIGHTING)
+    usual = default_settings(TRACKER, WEIGHTING)
+    rules = dataclasses.replace(
+        usual, refinement=dataclasses.replace(usual.refinement, above_floor=above_floor)
+    )
     likelihood = WEIGHTINGS[WEIGHTING].prepare(body, cameras, rules.weighting)
     following = Following(
         rules, search_space(body, sigma), start_of(tuple(start.tolist())), 0, FrameRefiner(body, cameras, 0)
@@ -180,21 +185,28 @@ def shaped_body(
     numbers = np.array(frames[: len(followed)])
     chosen = varied_frames(body, numbers, followed, FITTED_FRAMES)
     rows = np.searchsorted(numbers, chosen)
-    fit = fitted_shape(body, cameras, [evidence(frame) for frame in chosen], followed[rows])
+    fit = fitted_shape(body, cameras, [evidence(frame) for frame in chosen], followed[rows], above_floor)
     progress(STEP, len(frames) + 1, len(frames) + 1)
     return FittedShape(fit.body, followed[0], fit.sizes, fit.overlap)
 
 
 def fitted_shape(
-    body: BodyModel, cameras: tuple[Camera, ...], frames: Sequence[FrameEvidence], poses: Array
+    body: BodyModel,
+    cameras: tuple[Camera, ...],
+    frames: Sequence[FrameEvidence],
+    poses: Array,
+    above_floor: bool = True,
 ) -> FittedShape:
-    """The shape of a body on some frames' masks, from its poses there (F, D), which are in the right valley."""
+    """The shape of a body on some frames' masks, from its poses there (F, D), which are in the right valley.
+    above_floor : as in `ShapeRefiner`.
+    """
     space = shape_space(body, lengths="untaped", flesh=True)
     prior = ShapePrior(space, ShapeSpreads(), None)
     borders = [silhouette_distances(frame) for frame in frames]
-    fit = ShapeRefiner(ShapePrograms(space), cameras, borders, prior, lengths_known=True).refine(
-        np.zeros(len(space.groups)), poses
+    refiner = ShapeRefiner(
+        ShapePrograms(space), cameras, borders, prior, lengths_known=True, above_floor=above_floor
     )
+    fit = refiner.refine(np.zeros(len(space.groups)), poses)
     shaped = space.body_of(fit.shape)
     overlap = _overlap(body, cameras, frames, poses), _overlap(shaped, cameras, frames, fit.poses)
     return FittedShape(shaped, fit.poses[0], _sizes(space, fit.shape), overlap)
@@ -252,6 +264,7 @@ def _key(session: Session, body: BodyModel, settings: RunSettings, start: Array,
         {name: round(value, KEY_DIGITS) for name, value in body.dimensions.items()},
         sorted(untaped_lengths(body)),
         {name: value for name, value in evidence.items() if name.startswith("mask_") or value != usual[name]},
+        settings.refinement.above_floor,
         (np.round(start, KEY_DIGITS) + 0.0).tolist(),  # no negative zero
         (frames.start, frames.stop),
     )

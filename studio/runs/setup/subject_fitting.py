@@ -67,6 +67,11 @@ class FitRequest:
     ] = True
     lengths: Annotated[bool, Field(description="Fit lengths.")] = True
     radii: Annotated[bool, Field(description="Fit radii.")] = True
+    above_floor: Annotated[
+        bool,
+        Field(description="Nothing of the body lies below the floor, z = 0."),
+        Terminal("--above-floor/--no-floor"),
+    ] = True
     height_mm: Annotated[
         Height, Field(description="Known to a few centimetres, mm; default: the subject's.")
     ] = None
@@ -166,7 +171,12 @@ def fit_session_subject(
     progress("3 of 3, refining lengths and radii", 0, 1)
     borders = [silhouette_distances(one) for one in evidence]
     refiner = ShapeRefiner(
-        silhouettes.programs, session.cameras(), borders, prior, lengths_known=not request.lengths
+        silhouettes.programs,
+        session.cameras(),
+        borders,
+        prior,
+        lengths_known=not request.lengths,
+        above_floor=request.above_floor,
     )
     refined = refiner.refine(searched.shape, searched.poses, request.seed, others=(start,))
     fitted = space.body_of(refined.shape)

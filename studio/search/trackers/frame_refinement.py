@@ -31,7 +31,7 @@ from studio.search.trackers.hidden_areas import learnt, without_hidden
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
 from studio.search.trackers.limbs_elsewhere import Change, LimbsElsewhere, lost_of
 from studio.search.trackers.random_numbers import keyed_generator
-from studio.search.trackers.refinement import Distances, RefinementSettings, Refiner
+from studio.search.trackers.refinement import FLOOR_HELP, Distances, RefinementSettings, Refiner
 from studio.search.trackers.tracker import (
     LIMB_LOST_SHARE,
     FilterState,
@@ -87,6 +87,7 @@ class FrameRefinementSettings:
         True, label="resample lost limbs",
         help="Where the silhouettes show that a limb is off, sample it over its whole range and refine the best.",
     )  # fmt: skip
+    above_floor: bool = next_frame_knob(True, label="stays above the floor", help=FLOOR_HELP)
     refined_spread: float = next_frame_knob(
         0.5, 0.05, 3.0, 0.05, label="spread after refinement",
         help="Multiplies σ0 where a frame starts from a refined pose, which is nearer to the body than a searched one.",
@@ -95,6 +96,13 @@ class FrameRefinementSettings:
         POSE, choices=(POSE, CLOUD), label="next frame starts from",
         help="Where every particle of the next frame starts: at the refined pose, or in the cloud moved with it.",
     )  # fmt: skip
+
+
+def descent(
+    settings: FrameRefinementSettings, steps: int = RefinementSettings().refinement_steps
+) -> RefinementSettings:
+    """The settings of a run's local descents, of at most so many steps."""
+    return RefinementSettings(refinement_steps=steps, refinement_floor=settings.above_floor)
 
 
 def space_after(space: SearchSpace, carried: FilterState, settings: FrameRefinementSettings) -> SearchSpace:
@@ -143,7 +151,9 @@ class FrameRefiner:
         if not any(len(view.border) for view in seen.values()):
             return result
         refiner, redrawing, agreement, certainty_of, witness = self._prepared(
-            tuple(seen), settings.refine_frame_steps
+            tuple(seen),
+            descent(settings, settings.refine_frame_steps),
+            descent(settings, max(settings.refine_frame_steps, REDRAWN_STEPS)),
         )
         start, masks, memory = result.estimate.pose, tuple(seen.values()), result.carried.memory
         silhouettes = without_hidden(masks, agreement.cameras, agreement.mm_per_pixel(start), memory)
@@ -188,15 +198,14 @@ class FrameRefiner:
             limb_loss=certainty.lost(off, elsewhere),
         )
 
-    def _made_for(self, names: tuple[str, ...], steps: int) -> "_Prepared":
+    def _made_for(
+        self, names: tuple[str, ...], settings: RefinementSettings, redrawing: RefinementSettings
+    ) -> "_Prepared":
         cameras = tuple(self._cameras[name] for name in names)
-        ending, redrawing = (
-            Refiner(self._body, cameras, RefinementSettings(refinement_steps=most))
-            for most in (steps, max(steps, REDRAWN_STEPS))
-        )
+        ending = Refiner(self._body, cameras, settings)
         return _Prepared(
             ending,
-            redrawing,
+            Refiner(self._body, cameras, redrawing),
             Agreement(self._body, cameras),
             CertaintyOfLimbs(ending),
             LimbsElsewhere(self._body, cameras),

@@ -71,13 +71,14 @@ def with_limbs_bridged(
     named: Sequence[Sequence[str]],
     fps: float,
     silhouettes_of: SilhouettesOf,
+    settings: RefinementSettings | None = None,
 ) -> tuple[Array, tuple[Bridge, ...]]:
     """A tracked clip with its doubtful limbs bridged, (K, D), and what was changed; other frames keep their poses.
 
-    frames : (K,) ascending. poses : (K, D). named : of each frame the limbs that the tracker called lost. Raises what
-    `silhouettes_of` raises.
+    frames : (K,) ascending. poses : (K, D). named : of each frame the limbs that the tracker called lost. settings : of
+    the descents. Raises what `silhouettes_of` raises.
     """
-    work = _Work(body, cameras, frames, poses, fps, silhouettes_of)
+    work = _Work(body, cameras, frames, poses, fps, silhouettes_of, settings or RefinementSettings())
     for limb in dict.fromkeys(limb_names(body)):
         lost = np.array([limb in names for names in named], np.bool_)
         for first, after in work.stretches(limb, lost):
@@ -96,6 +97,7 @@ class _Work:
         poses: Array,
         fps: float,
         silhouettes_of: SilhouettesOf,
+        settings: RefinementSettings,
     ) -> None:
         self._body, self._frames, self._fps = body, frames, fps
         self.poses, self.bridges = poses.copy(), list[Bridge]()
@@ -103,7 +105,8 @@ class _Work:
         self._cameras, self._silhouettes_of = {camera.name: camera for camera in cameras}, silhouettes_of
         self._seen = functools.lru_cache(KEPT_SILHOUETTES)(self._seen_in)
         self._refiners: dict[tuple[str, ...], Refiner] = {}
-        refiner = Refiner(body, tuple(cameras), RefinementSettings())
+        self._settings = settings
+        refiner = Refiner(body, tuple(cameras), settings)
         self._own = {limb: bent_by(refiner, limb) for limb in dict.fromkeys(self._names.tolist())}
 
     def stretches(self, limb: str, lost: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -199,7 +202,7 @@ class _Work:
         names = tuple(seen)
         if names not in self._refiners:
             cameras = tuple(self._cameras[name] for name in names)
-            self._refiners[names] = Refiner(self._body, cameras, RefinementSettings())
+            self._refiners[names] = Refiner(self._body, cameras, self._settings)
         return self._refiners[names], tuple(seen.values())
 
     # ------------------------------------------------------------------ movement

@@ -33,6 +33,7 @@ from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import knob
 from studio.search.likelihood.outlines import OutlineProjector
+from studio.search.trackers.floor_hold import FloorHold, has_floor
 from studio.search.trackers.mesh_equations import MeshEquations
 from studio.search.trackers.refinement_kernels import normal_equations
 from studio.search.trackers.tracker import FrameLikelihood
@@ -94,6 +95,10 @@ class Distances(Protocol):
         ...
 
 
+FLOOR_HELP = (
+    "Pull what of a body that is sized by its height (a person, a dog) lies below the floor, z = 0, back up. Off where"
+    " the floor is elsewhere, or for who swims."
+)
 Equations = tuple[float, Array, Array]
 """A loss, and the gradient (D,) and matrix (D, D) of half of it per unit of each parameter."""
 FrameLoss = Callable[[Array], Equations]
@@ -120,6 +125,8 @@ class RefinementSettings:
         40.0, 0.0, 200.0, 1.0, unit="m/s²",
         help="Usual acceleration of limbs; it couples neighbouring frames. 0: every frame on its own.",
     )  # fmt: skip
+
+    refinement_floor: bool = knob(True, help=FLOOR_HELP)
 
     # Walks and runs on subtracted masks: 0.84 to 0.95; masks that show a platform and its shadow as well: 0.57 to 0.64,
     # and refined poses that jump by 100 mm from frame to frame.
@@ -163,6 +170,8 @@ class Refiner:
         self.meshes = MeshEquations(body, cameras, DIFFERENCE * self.unit) if body.meshes else None
         if self.meshes is not None:
             self.stiffness[:] = 0.0
+        on_floor = settings.refinement_floor and has_floor(body)
+        self._floor = FloorHold(body, self.unit, DIFFERENCE) if on_floor else None
 
     def refine(
         self, pose: Array, silhouettes: Sequence[Distances], problem: FrameLikelihood | None = None
@@ -207,6 +216,9 @@ class Refiner:
                 else self._equations(pose, prepared)
             )
             away, bent = (pose - start) / self.unit, (pose - self.neutral) / self.unit
+            held = None if self._floor is None else self._floor.of(pose)
+            if held is not None:
+                loss, gradient, matrix = loss + held.loss, gradient + held.gradient, matrix + held.matrix
             gradient += pull * away
             gradient += self.stiffness * bent
             diagonal = matrix.reshape(-1)[:: size + 1]

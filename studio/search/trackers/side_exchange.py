@@ -140,12 +140,13 @@ def with_sides_right(
     poses: Array,
     fps: float,
     silhouettes_of: SilhouettesOf,
+    settings: RefinementSettings | None = None,
 ) -> tuple[Array, tuple[Exchange, ...]]:
     """A tracked clip with its sides put right, (K, D), and what was exchanged; other frames keep their poses.
 
-    frames : (K,) ascending. poses : (K, D). Raises what `silhouettes_of` raises.
+    frames : (K,) ascending. poses : (K, D). settings : of the descents. Raises what `silhouettes_of` raises.
     """
-    work = _Work(body, cameras, frames, poses, fps, silhouettes_of)
+    work = _Work(body, cameras, frames, poses, fps, silhouettes_of, settings or RefinementSettings())
     rounds = 0
     while rounds < MOST_ROUNDS and work.put_right():
         rounds += 1
@@ -163,6 +164,7 @@ class _Work:
         poses: Array,
         fps: float,
         silhouettes_of: SilhouettesOf,
+        settings: RefinementSettings,
     ) -> None:
         self.body, self.frames, self.poses, self._fps = body, frames, poses.copy(), fps
         self._kinds = {
@@ -172,7 +174,7 @@ class _Work:
         by_name = {camera.name: camera for camera in cameras}
 
         def refiner(names: tuple[str, ...]) -> Refiner:
-            return Refiner(body, tuple(by_name[name] for name in names), RefinementSettings())
+            return Refiner(body, tuple(by_name[name] for name in names), settings)
 
         self._refiner = functools.cache(refiner)
         self._silhouettes_of = silhouettes_of

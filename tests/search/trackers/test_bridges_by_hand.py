@@ -9,6 +9,7 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.search.trackers import limb_bridging
 from studio.search.trackers.limb_bridging import Bridge, _Work
+from studio.search.trackers.refinement import RefinementSettings
 
 Array = np.ndarray
 BODY = load_body("human29")
@@ -218,7 +219,7 @@ def test_margins_end_with_the_clip_and_where_frames_are_missing() -> None:
 def test_ends_are_those_of_the_limbs_parts_at_a_persons_size(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limb_bridging, "scale_of", lambda body: 2.0)
     poses = np.stack([BODY.neutral, BODY.neutral + 0.1])
-    work = _Work(BODY, (), np.arange(2), poses, 30.0, dict)
+    work = _Work(BODY, (), np.arange(2), poses, 30.0, dict, RefinementSettings())
     parts = [
         n for n, limb in enumerate(BODY.drawn) if limb.name in ("left upper arm", "left forearm", "left hand")
     ]

@@ -94,7 +94,9 @@ UNUSED = {
         "model_free_share", "model_free_grows", "online_learning", "learning_overlap", "learning_interval",
     },
     "weights as they are": {"survival", "root_spread", "learning_overlap", "learning_interval", "diffusion_scale"},
-    "nothing refined": {"refine_frame_steps", "refine_frame_points", "refined_spread", "next_frame_from"},
+    "nothing refined": {
+        "refine_frame_steps", "refine_frame_points", "above_floor", "refined_spread", "next_frame_from",
+    },
     "no recovery": {"lost_after", "recovery_interval"},
 }  # fmt: skip
 

@@ -9,6 +9,7 @@ from drawn_people import drawn_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.evidence.distance_maps import SilhouetteDistances, silhouettes_by_camera
+from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.side_exchange import (
     CHANGE,
     Exchange,
@@ -95,7 +96,7 @@ def test_frames_around_one_that_may_be_exchanged_are_examined_until_it_is_ruled_
 ) -> None:
     """The likeliest first, and in each the pose of a neighbour that explains clearly more."""
     gains = [-1.0, -1.0, 0.1, 0.2, 0.3, 0.29, -0.2, -1.0, -1.0]
-    work = _Work(BODY, CAMERAS, FRAMES[:9], walk[:9], FPS, shown)
+    work = _Work(BODY, CAMERAS, FRAMES[:9], walk[:9], FPS, shown, RefinementSettings())
     legs, offered = next(one for one in work._kinds if "leg" in one.what), []
     known = work._kinds[legs]
 

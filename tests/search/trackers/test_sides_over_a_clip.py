@@ -11,6 +11,7 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.search.trackers import side_exchange
 from studio.search.trackers.agreement import limb_names
+from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.side_exchange import (
     Exchange,
     Kind,
@@ -281,7 +282,9 @@ def test_no_gain_beyond_one_counts_and_without_a_gain_nothing_is_put_right() -> 
 
 def test_half_the_gain_a_frame_counts_at_twice_the_rate() -> None:
     for fps, share in ((30.0, 1.0), (60.0, 0.5), (20.0, 1.5), (10.0, 1.5)):
-        assert _Work(BODY, (), np.arange(2), np.zeros((2, 29)), fps, dict)._share == share
+        assert (
+            _Work(BODY, (), np.arange(2), np.zeros((2, 29)), fps, dict, RefinementSettings())._share == share
+        )
 
 
 def test_a_body_that_walks_backwards_counts_for_an_exchange_of_its_sides() -> None:
@@ -336,7 +339,7 @@ def test_a_body_twice_as_large_walks_twice_as_fast(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(side_exchange, "scale_of", lambda body: 2.0)
     poses, _ = walking(np.full(30, -25.0))
     np.testing.assert_allclose(work_on(poses)._backwards(), 0.375, atol=1e-9)
-    work = _Work(BODY, (), np.arange(31), poses, 30.0, dict)
+    work = _Work(BODY, (), np.arange(31), poses, 30.0, dict, RefinementSettings())
     kind = kinds_of(BODY)[1]
     expected = limb_ends(BODY, poses)[:, kind.limbs].reshape(31, -1, 3) / 2.0
     np.testing.assert_allclose(work._ends(kind, poses), expected)
