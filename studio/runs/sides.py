@@ -1,5 +1,4 @@
-"""Corrects a finished run as a whole: doubtful limbs are bridged from both ends (`search.trackers.limb_bridging`), and
-exchanged sides, left and right, front and back, are put right (`search.trackers.side_exchange`).
+"""Corrects a finished run as a whole (`search.trackers.clip_mending`).
 
 The tracked poses stay. If anything was corrected, the corrected poses are the track "sides", with the corrections in
 its `made_by`; otherwise there is no such track.
@@ -29,12 +28,11 @@ from studio.runs.tracks import (
     track_digest,
     write_track,
 )
+from studio.search.trackers.clip_mending import mended_clip
 from studio.search.trackers.frame_refinement import descent
 from studio.search.trackers.hidden_areas import without_hidden
-from studio.search.trackers.limb_bridging import with_limbs_bridged
 from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.refinement import Distances, mm_at
-from studio.search.trackers.side_exchange import with_sides_right
 from studio.search.trackers.tracker import LIMB_LOST
 from studio.sessions.stored_run import StoredRun
 
@@ -73,11 +71,9 @@ def correct_clip(
             for frame, state in zip(track.frames, track.states, strict=True)
         ]
         fps = run.record.fps
-        bridged, bridges = with_limbs_bridged(
+        corrected, words = mended_clip(
             body, cameras, track.frames, track.poses, named, fps, silhouettes_of, how
         )
-        corrected, changes = with_sides_right(body, cameras, track.frames, bridged, fps, silhouettes_of, how)
-    words = (*(bridge.words for bridge in bridges), *(change.words for change in changes))
     if not words:
         drop_track(run, SIDES)
         return ()

@@ -37,10 +37,9 @@ from studio.search.likelihood.devices import CPU, DEVICE_KNOB
 from studio.search.likelihood.hard_priors import HardPriors
 from studio.search.settings import RunSettings, changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS
+from studio.search.trackers.clip_mending import mended_clip
 from studio.search.trackers.frame_refinement import FrameRefiner, descent
-from studio.search.trackers.limb_bridging import with_limbs_bridged
 from studio.search.trackers.refinement import Distances
-from studio.search.trackers.side_exchange import with_sides_right
 from studio.search.trackers.tracker import LayerRecord, start_of
 from studio.sessions.session import Session
 
@@ -235,9 +234,9 @@ def track_seeds(
                 return known_silhouettes(body, seen_with, evidence(frame), poses[row], run.memories[row])
 
             rows = np.array(frames)
-            how = descent(settings.refinement)
-            poses = with_limbs_bridged(body, seen_with, rows, poses, lost, rate, silhouettes_of, how)[0]
-            poses = with_sides_right(body, seen_with, rows, poses, rate, silhouettes_of, how)[0]
+            poses, _ = mended_clip(
+                body, seen_with, rows, poses, lost, rate, silhouettes_of, descent(settings.refinement)
+            )
         figures = measured(session, body, poses, np.array(frames), evaluations, seconds / len(runs))
         by_frame = dict(zip(frames, lost, strict=True))
         impossible = int((~HardPriors(body).hold(poses, limbs_apart=True)).sum())

@@ -1,0 +1,132 @@
+"""A mouse that a tracked clip turns half round for some frames points ahead again."""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+from drawn_people import drawn_evidence, ring_of_cameras
+
+from studio.body.catalogue import load_body
+from studio.body.forward_kinematics import marker_points
+from studio.evidence.distance_maps import SilhouetteDistances, silhouettes_by_camera
+from studio.foundations.arrays import Array
+from studio.search.trackers.frame_refinement import turned_pose
+from studio.search.trackers.turning_back import Turn, stretches, with_facing_right
+
+CAMERAS = tuple(
+    dataclasses.replace(camera, translation=camera.translation / 10.0)
+    for camera in ring_of_cameras(3, 320, 240)
+)
+MOUSE = load_body("mouse31")
+NAMES = [entry.name for entry in MOUSE.parameters]
+FPS, FRAMES = 60.0, np.arange(100, 108)
+
+
+def walk() -> Array:
+    """(8, D) a mouse that walks and bends to a side, its tail aside."""
+    poses = np.repeat(MOUSE.neutral[None], len(FRAMES), axis=0)
+    poses[:, NAMES.index("pelvis_x")] = np.linspace(-20.0, 20.0, len(FRAMES))
+    poses[:, NAMES.index("heading")] = np.linspace(0.3, 0.5, len(FRAMES))
+    poses[:, NAMES.index("tail_wag")] = 0.5
+    return poses
+
+
+WALK = walk()
+
+
+@cache
+def seen(frame: int) -> Mapping[str, SilhouetteDistances]:
+    return silhouettes_by_camera(drawn_evidence(MOUSE, WALK[frame - FRAMES[0]], CAMERAS), 150)
+
+
+def turned_in(*rows: int) -> Array:
+    """The walk, turned half round in some frames."""
+    poses = WALK.copy()
+    for row in rows:
+        turned = turned_pose(MOUSE, WALK[row])
+        assert turned is not None
+        poses[row] = turned
+    return poses
+
+
+def right(poses: Array, frames: Array = FRAMES, fps: float = FPS) -> tuple[Array, tuple[Turn, ...]]:
+    return with_facing_right(MOUSE, CAMERAS, frames, poses, fps, seen)
+
+
+def off(poses: Array) -> Array:
+    """(K,) largest distance of a marker from where it is, mm."""
+    away = marker_points(MOUSE, poses) - marker_points(MOUSE, WALK)
+    return np.asarray(np.linalg.norm(away, axis=2).max(axis=1))
+
+
+def test_a_mouse_that_is_turned_round_for_some_frames_is_turned_back() -> None:
+    planted = turned_in(2, 5, 6)
+    assert (off(planted)[[2, 5, 6]] > 100.0).all()
+    found, turns = right(planted)
+    assert [(turn.first, turn.last) for turn in turns] == [(102, 102), (105, 106)]
+    assert off(found).max() < 15.0
+    kept = [0, 1, 3, 4, 7]
+    np.testing.assert_array_equal(found[kept], planted[kept])
+    assert turns[1].words == "frames 105 to 106: turned round, as the frames before and after point"
+
+
+def test_a_clip_in_which_it_never_turns_is_unchanged() -> None:
+    found, turns = right(WALK)
+    assert turns == ()
+    np.testing.assert_array_equal(found, WALK)
+
+
+def test_what_has_no_end_on_both_sides_or_is_long_is_left() -> None:
+    # Nothing says which of two parts is wrong, and a gap may hide a turn.
+    for planted, frames in (
+        (turned_in(5, 6, 7), FRAMES),
+        (turned_in(3, 4), FRAMES + np.array([0, 0, 0, 5, 5, 9, 9, 9])),
+    ):
+        found, turns = right(planted, frames)
+        assert turns == ()
+        np.testing.assert_array_equal(found, planted)
+    # Three frames are a quarter of a second or more at ten frames a second.
+    found, turns = right(turned_in(3, 4, 5), fps=10.0)
+    assert turns == ()
+    np.testing.assert_array_equal(found, turned_in(3, 4, 5))
+
+
+def test_a_turn_that_the_pictures_show_stays() -> None:
+    really = turned_in(2, 3, 4, 5, 6)
+
+    def shown(frame: int) -> Mapping[str, SilhouetteDistances]:
+        return silhouettes_by_camera(drawn_evidence(MOUSE, really[frame - FRAMES[0]], CAMERAS), 150)
+
+    found, turns = with_facing_right(MOUSE, CAMERAS, FRAMES, really, FPS, shown)
+    assert turns == ()
+    np.testing.assert_array_equal(found, really)
+
+
+def test_a_body_turns_as_fast_as_its_file_says() -> None:
+    headings = np.radians([0.0, 85.0, 180.0, 340.0])
+    poses = np.repeat(MOUSE.neutral[None], 4, axis=0)
+    poses[:, NAMES.index("heading")] = headings
+    # 400 degrees a second: 13 in a sixtieth, 200 in half a second.
+    assert [part.tolist() for part in stretches(MOUSE, poses, 60.0)] == [[0, 1], [2], [3]]
+    assert [part.tolist() for part in stretches(MOUSE, poses, 2.0)] == [[0, 1, 2, 3]]
+
+
+def test_a_reared_mouse_that_turns_about_itself_is_noticed() -> None:
+    poses = np.repeat(MOUSE.neutral[None], 2, axis=0)
+    poses[:, NAMES.index("pitch")] = np.radians(-90.0)
+    poses[1, NAMES.index("heading")] = np.pi
+    assert len(stretches(MOUSE, poses, 60.0)) == 2
+
+
+def test_people_are_not_looked_at() -> None:
+    person = load_body("human29")
+    poses = np.repeat(person.neutral[None], 3, axis=0)
+    poses[1, [entry.name for entry in person.parameters].index("heading")] = np.pi
+
+    def nothing(_: int) -> Mapping[str, SilhouetteDistances]:
+        raise AssertionError
+
+    found, turns = with_facing_right(person, CAMERAS, np.arange(3), poses, FPS, nothing)
+    assert turns == ()
+    np.testing.assert_array_equal(found, poses)
