@@ -92,8 +92,13 @@ def stretches(body: BodyModel, poses: Array, fps: float) -> list[Indices]:
     turned = joint_frames(body, poses)[:, root, :, :3]
     cosines = 0.5 * (np.einsum("nij,nij->n", turned[1:], turned[:-1]) - 1.0)
     angles = np.arccos(np.clip(cosines, -1.0, 1.0))
-    own = [body.parameters[number].max_step for number in root_parameters(body) if body.angles[number]]
-    fastest = max((step for step in own if np.isfinite(step)), default=0.0) / fps
+    own = root_parameters(body).tolist()
+    steps = [
+        entry.max_step
+        for number, entry in enumerate(body.parameters)
+        if number in own and body.angles[number]
+    ]
+    fastest = max((step for step in steps if np.isfinite(step)), default=0.0) / fps
     at = 1 + np.flatnonzero(angles > max(HALF_WAY, fastest))
     return np.split(np.arange(len(poses), dtype=np.int64), at)
 

@@ -10,7 +10,7 @@ from drawn_people import drawn_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.evidence.distance_maps import SilhouetteDistances, silhouettes_by_camera
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, Indices
 from studio.search.trackers.frame_refinement import turned_pose
 from studio.search.trackers.turning_back import Turn, stretches, with_facing_right
 
@@ -50,7 +50,7 @@ def turned_in(*rows: int) -> Array:
     return poses
 
 
-def right(poses: Array, frames: Array = FRAMES, fps: float = FPS) -> tuple[Array, tuple[Turn, ...]]:
+def right(poses: Array, frames: Indices = FRAMES, fps: float = FPS) -> tuple[Array, tuple[Turn, ...]]:
     return with_facing_right(MOUSE, CAMERAS, frames, poses, fps, seen)
 
 
