@@ -45,6 +45,9 @@ from studio.search.trackers.refinement import (
 from studio.search.trackers.refinement_kernels import normal_equations
 from studio.search.trackers.shape_prior import ShapePrior
 
+HELD = 0.5
+"""Scale of the Cauchy distribution, in an angle's usual spread, that holds it where flesh may lie off the bone:
+silhouettes hardly tell a nod from a head before its bone, yet who bends it far is not pulled back."""
 SCALE_MM = 50.0
 """c of the loss: from this distance on a point of the border may not be body."""
 ALIKE = 9.0
@@ -135,8 +138,10 @@ class ShapeRefiner:
         self._limits = np.stack([body.lower, body.upper])
         spread = np.where(hidden_angles(body), HIDDEN_SPREAD, ANGLE_SPREAD)
         usual = np.isfinite(body.spread)
-        spread = np.where(usual, body.spread, spread)
+        off_bone = any(group.kind == "offset" for group in programs.space.groups)
+        spread = np.where(usual, (HELD if off_bone else 1.0) * body.spread, spread)
         self.stiffness = np.where(body.bounded_angles | usual, 1.0 / np.square(spread), 0.0)
+        self._eased = usual & off_bone
         self._variance = FIRST_VARIANCE
         on_floor = above_floor and has_floor(body)
         self._floor = FloorHoldOfShapes(programs.space, self._unit, DIFFERENCE) if on_floor else None
@@ -280,10 +285,13 @@ class ShapeRefiner:
         worth = 1.0 / (ALIKE * self._variance)
         gradients, matrices = worth * gradients, worth * matrices
         away = (poses - self._body.neutral) / self._unit
-        gradients[:, :size] += self.stiffness * away
-        matrices[:, np.arange(size), np.arange(size)] += self.stiffness
+        squares = self.stiffness * np.square(away)
+        eased = np.where(self._eased, 1.0 + squares, 1.0)
+        gradients[:, :size] += self.stiffness * away / eased
+        matrices[:, np.arange(size), np.arange(size)] += self.stiffness / eased
         loss, pull, matrix = self._prior.equations(shape)
-        loss += worth * (float(borders.sum()) + held) + float((self.stiffness * np.square(away)).sum())
+        own_pulls = float(np.where(self._eased, np.log(eased), squares).sum())
+        loss += worth * (float(borders.sum()) + held) + own_pulls
         return _State(shape, poses, loss, borders, gradients, matrices, pull, matrix)
 
     def _slopes_of_shape(self, shape: Array, poses: Array) -> Array:

@@ -145,3 +145,31 @@ def test_a_roll_whose_usual_deviation_is_known_is_held() -> None:
     assert pulls[[e.name for e in mouse.body.parameters].index("roll")] == pytest.approx(
         (SPREAD_PULL / np.radians(20.0)) ** 2
     )
+
+
+def test_a_nod_is_held_near_rest_and_let_go_far_from_it_where_the_head_may_lie_before_its_bone() -> None:
+    """The body file's 15 degrees with flesh on the bones, half of it where its place is fitted, too; the pull there is
+    the slope of half the loss, and falls with the distance.
+    """
+    body = load_body("human35")
+    nod = [entry.name for entry in body.parameters].index("neck_nod")
+    for flesh, degrees in ((False, 15.0), (True, 7.5)):
+        own = shape_space(body, lengths="untaped", flesh=flesh)
+        empty = [distances_of(np.zeros((camera.height, camera.width), np.uint8)) for camera in CAMERAS]
+        refiner = ShapeRefiner(
+            ShapePrograms(own), CAMERAS, [empty], ShapePrior(own, ShapeSpreads(), None), lengths_known=True
+        )
+        assert refiner.stiffness[nod] == pytest.approx(np.radians(degrees) ** -2.0)
+        pulls: list[float] = []
+        for bent in (2.0, 40.0):
+            pose, shape = body.neutral.copy(), np.zeros(len(own.groups))
+            pose[2] += 1000.0
+            pose[nod] += np.radians(bent)
+            frames = [refiner._frame(pose, empty)]
+            states = [
+                refiner._state(shape, (pose + step * np.eye(len(pose))[nod])[None], frames)
+                for step in (-1e-5, 0.0, 1e-5)
+            ]
+            pulls.append(states[1].gradients[0, nod])
+            assert pulls[-1] == pytest.approx((states[2].loss - states[0].loss) / 4e-5, rel=1e-3)
+        assert (pulls[1] > pulls[0]) is not flesh
