@@ -6,6 +6,7 @@ where four views of a frame are requested at once). Hence one lock.
 """
 
 import io
+import itertools
 import math
 import threading
 import zipfile
@@ -34,6 +35,13 @@ def runs_of(mask: Mask) -> list[tuple[int, int]]:
     """The runs of True in a mask (K,), each as its first row and one past its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
+
+
+def consecutive(frames: Indices) -> tuple[slice, ...]:
+    """Slices of rows whose frames (K,) are consecutive."""
+    breaks = np.flatnonzero(np.diff(frames) != 1) + 1
+    edges = [0, *breaks.tolist(), len(frames)]
+    return tuple(slice(first, last) for first, last in itertools.pairwise(edges) if last > first)
 
 
 def median_and_spread(values: Array) -> tuple[float, float]:

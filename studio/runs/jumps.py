@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel, limb_moving
 from studio.body.scale import scale_of
-from studio.foundations.arrays import Array, median_and_spread, runs_of
-from studio.runs.tracks import Track, stretches
+from studio.foundations.arrays import Array, consecutive, median_and_spread, runs_of
+from studio.runs.tracks import Track
 
 LEAST_MM = 25.0
 """A second difference (mm a frame², of a person: `scale_of`) below this is no jump, however still the limb is
@@ -72,7 +72,7 @@ def marker_limbs(body: BodyModel) -> tuple[str, ...]:
 def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array, least: float) -> list[Jump]:
     """The jumps of one limb. points : (K, M, 3) its markers. least : mm, of any jump."""
     bends = np.full(len(frames), np.nan)
-    for part in (part for part in stretches(frames) if part.stop - part.start > 2):
+    for part in (part for part in consecutive(frames) if part.stop - part.start > 2):
         second = np.linalg.norm(np.diff(points[part], n=2, axis=0), axis=-1).max(axis=1)
         bends[part.start + 1 : part.stop - 1] = second
     known = bends[np.isfinite(bends)]

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, consecutive
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import filmed_cameras
-from studio.runs.tracks import Track, stretches
+from studio.runs.tracks import Track
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
 from studio.search.trackers.hidden_areas import without_hidden
@@ -69,7 +69,7 @@ def _parts(frames: NDArray[np.int64], sure: NDArray[np.bool_]) -> list[NDArray[n
     """Groups of rows refined together: consecutive sure frames; every other row alone."""
     parts: list[NDArray[np.int64]] = []
     rows = np.flatnonzero(sure)
-    parts += [rows[part] for part in stretches(frames[rows] + np.cumsum(~sure)[rows])]
+    parts += [rows[part] for part in consecutive(frames[rows] + np.cumsum(~sure)[rows])]
     parts += [np.array([row]) for row in np.flatnonzero(~sure)]
     return sorted(parts, key=lambda part: int(part[0]))
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from studio.body.forward_kinematics import marker_points
-from studio.foundations.arrays import Array
+from studio.foundations.arrays import Array, consecutive
 from studio.foundations.errors import RunError
 from studio.foundations.progress import Progress, no_progress
 from studio.runs.problem_source import ProblemSource
@@ -26,7 +26,6 @@ from studio.runs.tracks import (
     Track,
     best_track,
     read_track,
-    stretches,
     track_digest,
     track_named,
     track_names,
@@ -142,7 +141,7 @@ def jitter(run: StoredRun, track: Track) -> float:
     if not body.markers or len(track.frames) < 3:
         return 0.0
     points = marker_points(body, track.poses)
-    parts = [points[part] for part in stretches(track.frames) if part.stop - part.start > 2]
+    parts = [points[part] for part in consecutive(track.frames) if part.stop - part.start > 2]
     if not parts:
         return 0.0
     weights = [len(part) - 2 for part in parts]

@@ -55,10 +55,8 @@ def correct_clip(
         return known
     track = read_track(run, RAW)
     settings = MaskSettings(run)
-    evidence, how = (
-        partial(_look_at, problems, settings, read),
-        descent(settings.of(run.record.first).refinement),
-    )
+    evidence = partial(_look_at, problems, settings, read)
+    how = descent(settings.of(run.record.first).refinement)
     body, cameras, poses = problems.body, problems.cameras, dict(zip(track.frames, track.poses, strict=True))
     with run.results() as results:
 

@@ -7,7 +7,6 @@ of its source, which shows whether the run has changed since (`best_track`).
 
 import hashlib
 import io
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -218,13 +217,6 @@ def drop_track(run: StoredRun, name: str) -> None:
     path = _path(run, name)
     with writing("The track", path):
         path.unlink(missing_ok=True)
-
-
-def stretches(frames: NDArray[np.int64]) -> tuple[slice, ...]:
-    """Slices of rows whose frames (K,) are consecutive."""
-    breaks = np.flatnonzero(np.diff(frames) != 1) + 1
-    edges = [0, *breaks.tolist(), len(frames)]
-    return tuple(slice(first, last) for first, last in itertools.pairwise(edges) if last > first)
 
 
 def _path(run: StoredRun, name: str) -> Path:

@@ -11,6 +11,7 @@ import pytest
 from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
+from studio.foundations.arrays import consecutive
 from studio.foundations.errors import NotFoundError, SessionError
 from studio.runs.tracks import (
     BEST,
@@ -18,7 +19,6 @@ from studio.runs.tracks import (
     Track,
     best_track,
     read_track,
-    stretches,
     track_digest,
     track_names,
     write_track,
@@ -140,8 +140,8 @@ def test_missing_and_damaged_tracks_are_named(run: StoredRun) -> None:
 
 
 def test_stretches_are_rows_without_a_gap() -> None:
-    assert stretches(np.array([2, 3, 4, 7, 9, 10])) == (slice(0, 3), slice(3, 4), slice(4, 6))
-    assert stretches(np.zeros(0, dtype=np.int64)) == ()
+    assert consecutive(np.array([2, 3, 4, 7, 9, 10])) == (slice(0, 3), slice(3, 4), slice(4, 6))
+    assert consecutive(np.zeros(0, dtype=np.int64)) == ()
 
 
 def made_of(run: StoredRun, source: str, name: str, shift: float = 0.0) -> Track:

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
+from studio.search.trackers.clip_silhouettes import SilhouettesOf
 from studio.search.trackers.limb_bridging import with_limbs_bridged
 from studio.search.trackers.refinement import RefinementSettings
-from studio.search.trackers.side_exchange import SilhouettesOf, with_sides_right
+from studio.search.trackers.side_exchange import with_sides_right
 from studio.search.trackers.turning_back import with_facing_right
 
 
@@ -22,14 +23,14 @@ def mended_clip(
     named: Sequence[Sequence[str]],
     fps: float,
     silhouettes_of: SilhouettesOf,
-    settings: RefinementSettings | None = None,
+    settings: RefinementSettings,
 ) -> tuple[Array, tuple[str, ...]]:
     """The clip's poses (K, D) mended, and what was changed, a line each; other frames keep their poses.
 
     frames : (K,) ascending. poses : (K, D). named : of each frame the limbs that the tracker called lost. settings : of
     the descents. Raises what `silhouettes_of` raises.
     """
-    faced, turns = with_facing_right(body, cameras, frames, poses, fps, silhouettes_of)
+    faced, turns = with_facing_right(body, cameras, frames, poses, fps, silhouettes_of, settings)
     bridged, bridges = with_limbs_bridged(body, cameras, frames, faced, named, fps, silhouettes_of, settings)
     corrected, changes = with_sides_right(body, cameras, frames, bridged, fps, silhouettes_of, settings)
     return corrected, tuple(one.words for one in (*turns, *bridges, *changes))

@@ -48,6 +48,14 @@ class Heights:
         drop = self._radii * np.sqrt(np.clip(1.0 - upward**2, 0.0, 1.0))[..., None]
         return ((ends[..., 2] - drop) / self._scale).reshape(len(poses), -1)
 
+    def slopes(self, pose: Array, unit: Array, step: float) -> Array:
+        """(D, 2 L) slopes of the heights at a pose (D,), per unit (D,) of each parameter. step : of the differences, in
+        units.
+        """
+        moves = step * np.diag(unit)
+        above, below = np.split(self.of(np.concatenate([pose + moves, pose - moves])), 2)
+        return (above - below) / (2.0 * step)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pull:
@@ -68,12 +76,10 @@ def pull_of(depths: Array, slopes: Array) -> Pull:
 
 
 class FloorHold:
-    """Pulls poses of a body out of the floor; immutable. steps : (D,) of the differences, of each parameter's own
-    kind, and in units.
-    """
+    """Pulls poses of a body out of the floor; immutable. unit, step : as of `Heights.slopes`."""
 
     def __init__(self, body: BodyModel, unit: Array, step: float) -> None:
-        self._heights, self._moves, self._step = Heights(body, scale_of(body)), step * np.diag(unit), step
+        self._heights, self._unit, self._step = Heights(body, scale_of(body)), unit, step
 
     def of(self, pose: Array) -> Pull | None:
         """The pull on a pose (D,) per unit; None where nothing lies below the floor."""
@@ -81,19 +87,16 @@ class FloorHold:
         low = np.flatnonzero(heights < 0.0)
         if not len(low):
             return None
-        around = self._heights.of(np.concatenate([pose + self._moves, pose - self._moves]))[:, low]
-        above, below = np.split(around, 2)
-        return pull_of(heights[low], (above - below) / (2.0 * self._step))
+        return pull_of(heights[low], self._heights.slopes(pose, self._unit, self._step)[:, low])
 
 
 class FloorHoldOfShapes:
     """Pulls bodies of one space, with their poses, out of the floor; immutable. For one pose heights are linear in the
-    dimensions, as are lengths and radii.
+    dimensions, as are lengths and radii. unit, step : as of `Heights.slopes`.
     """
 
     def __init__(self, space: ShapeSpace, unit: Array, step: float) -> None:
-        self._space, self._step = space, step
-        self._moves = step * np.diag(unit)
+        self._space, self._unit, self._step = space, unit, step
         body = space.body
         self._names = [name for group in space.groups for name in group.dimensions]
         self._scale = scale_of(body)
@@ -118,9 +121,8 @@ class FloorHoldOfShapes:
         by_shape = np.tensordot(self._sizes_by_shape(shape), by_size, 1)
         for number, pose in enumerate(low.tolist()):
             ends = np.flatnonzero(heights[pose] < 0.0)
-            around = here.of(np.concatenate([poses[pose] + self._moves, poses[pose] - self._moves]))[:, ends]
-            above, below = np.split(around, 2)
-            slopes = np.concatenate([(above - below) / (2.0 * self._step), by_shape[:, number, ends]])
+            by_pose = here.slopes(poses[pose], self._unit, self._step)
+            slopes = np.concatenate([by_pose[:, ends], by_shape[:, number, ends]])
             pulls[pose] = pull_of(heights[pose, ends], slopes)
         return pulls
 
@@ -128,8 +130,8 @@ class FloorHoldOfShapes:
         """(S, K) slopes of the K dimensions that a shape (S,) changes."""
 
         def sizes(other: Array) -> Array:
-            known = self._space.dimensions(other)
-            return np.array([known[name] for name in self._names])
+            by_name = self._space.dimensions(other)
+            return np.array([by_name[name] for name in self._names])
 
         steps = self._step * np.eye(len(shape))
         return np.array([(sizes(shape + one) - sizes(shape - one)) / (2.0 * self._step) for one in steps])

@@ -12,7 +12,6 @@ with d, how far the limb's ends move from frame to frame, and σ, how far they u
 convolutional codes", 1967.)
 """
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -25,16 +24,15 @@ from studio.body.scale import scale_of
 from studio.foundations.arrays import Array, Indices, median_and_spread, runs_of
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import limb_names
+from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
 from studio.search.trackers.frame_refinement import bent_by
-from studio.search.trackers.refinement import Distances, RefinementSettings, Refiner
+from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.side_exchange import (
-    KEPT_SILHOUETTES,
     MOST_SHARE,
     MOTION,
     NEAR_MM,
     REFERENCE_FPS,
     STILL_MM_S,
-    SilhouettesOf,
     moved,
 )
 
@@ -102,10 +100,7 @@ class _Work:
         self._body, self._frames, self._fps = body, frames, fps
         self.poses, self.bridges = poses.copy(), list[Bridge]()
         self._names = np.array(limb_names(body))
-        self._cameras, self._silhouettes_of = {camera.name: camera for camera in cameras}, silhouettes_of
-        self._seen = functools.lru_cache(KEPT_SILHOUETTES)(self._seen_in)
-        self._refiners: dict[tuple[str, ...], Refiner] = {}
-        self._settings = settings
+        self._seen = rows_seen(body, cameras, frames, silhouettes_of, settings)
         refiner = Refiner(body, tuple(cameras), settings)
         self._own = {limb: bent_by(refiner, limb) for limb in dict.fromkeys(self._names.tolist())}
 
@@ -196,14 +191,6 @@ class _Work:
     def _loss(self, row: int, pose: Array) -> float:
         refiner, silhouettes = self._seen(row)
         return refiner.loss_with_pull(pose, silhouettes)
-
-    def _seen_in(self, row: int) -> tuple[Refiner, tuple[Distances, ...]]:
-        seen = self._silhouettes_of(int(self._frames[row]))
-        names = tuple(seen)
-        if names not in self._refiners:
-            cameras = tuple(self._cameras[name] for name in names)
-            self._refiners[names] = Refiner(self._body, cameras, self._settings)
-        return self._refiners[names], tuple(seen.values())
 
     # ------------------------------------------------------------------ movement
 

@@ -21,10 +21,9 @@ examined of twelve clips (-0.2 to -0.7 on the mean), in the one with clutter and
 -0.09 on the mean; arms are below -0.06, the body turned below -0.13.
 """
 
-import functools
 import heapq
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,10 +37,8 @@ from studio.foundations.arrays import Array, Indices, runs_of
 from studio.foundations.errors import BodyError
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import limb_names
-from studio.search.trackers.refinement import Distances, RefinementSettings, Refiner
-
-SilhouettesOf = Callable[[int], Mapping[str, Distances]]
-"""The silhouettes of a frame by camera."""
+from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
+from studio.search.trackers.refinement import RefinementSettings
 
 GRID_S, BODY_GRID_S = 0.1, 0.5
 """Seconds between frames that are always examined: for pairs, for the body as a whole."""
@@ -64,7 +61,7 @@ BETTER = 0.02
 NOTABLY = 0.999
 """A loss below this share of another is better."""
 MOST_ROUNDS = 10
-KEPT_SILHOUETTES, TAKEN_TOGETHER = 96, 80
+TAKEN_TOGETHER = 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,14 +168,7 @@ class _Work:
             kind: _Examined(np.full(len(frames), np.nan), poses.copy(), np.zeros(len(frames), np.bool_))
             for kind in kinds_of(body)
         }
-        by_name = {camera.name: camera for camera in cameras}
-
-        def refiner(names: tuple[str, ...]) -> Refiner:
-            return Refiner(body, tuple(by_name[name] for name in names), settings)
-
-        self._refiner = functools.cache(refiner)
-        self._silhouettes_of = silhouettes_of
-        self._sight = functools.lru_cache(KEPT_SILHOUETTES)(self._seen_in)
+        self._sight = rows_seen(body, cameras, frames, silhouettes_of, settings)
         self._here: dict[int, tuple[Array, float]] = {}
         self._share = min(REFERENCE_FPS / fps, MOST_SHARE)
 
@@ -293,11 +283,6 @@ class _Work:
         refiner, silhouettes = self._sight(row)
         found = refiner.refine(pose, silhouettes).pose
         return found, self._loss(row, found)
-
-    def _seen_in(self, row: int) -> tuple[Refiner, tuple[Distances, ...]]:
-        """A row's silhouettes, and what refines poses on them."""
-        seen = self._silhouettes_of(int(self.frames[row]))
-        return self._refiner(tuple(seen)), tuple(seen.values())
 
     # ------------------------------------------------------------------ movement
 

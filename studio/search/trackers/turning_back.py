@@ -12,7 +12,6 @@ fits better. That is kept if both turns are gone with it, and if it costs less t
 The shortest part comes first; longer ones are left to `side_exchange`, which needs more frames to tell.
 """
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,12 +21,13 @@ from studio.body.branches import within_limits
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
 from studio.evidence.volume.alignment import root_parameters
-from studio.foundations.arrays import Array, Indices
+from studio.foundations.arrays import Array, Indices, consecutive
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
 from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, has_tail, redrawn, turned_pose
-from studio.search.trackers.refinement import RefinementSettings, Refiner
-from studio.search.trackers.side_exchange import MOST_GAIN, MOST_SHARE, REFERENCE_FPS, SilhouettesOf
+from studio.search.trackers.refinement import RefinementSettings
+from studio.search.trackers.side_exchange import MOST_GAIN, MOST_SHARE, REFERENCE_FPS
 
 HALF_WAY = np.pi / 2.0
 """rad: two frames that differ by more are nearer to each other once one is turned half round."""
@@ -58,30 +58,31 @@ def with_facing_right(
     poses: Array,
     fps: float,
     silhouettes_of: SilhouettesOf,
+    settings: RefinementSettings | None = None,
 ) -> tuple[Array, tuple[Turn, ...]]:
     """A tracked clip with the short stretches turned back in which its body points backwards, (K, D), and these.
 
-    frames : (K,) ascending. poses : (K, D). Only bodies with a tail that stay off their backs are looked at. Raises
-    what `silhouettes_of` raises.
+    frames : (K,) ascending. poses : (K, D). settings : of the descents. Only bodies with a tail that stay off their
+    backs are looked at. Raises what `silhouettes_of` raises.
     """
     if not has_tail(body) or not len(root_parameters(body)):
         return poses, ()
-    found, turns = poses.copy(), list[Turn]()
-    work = _Work(body, cameras, frames, fps, silhouettes_of)
-    for rows in _unbroken(frames):
+    mended, turns = poses.copy(), list[Turn]()
+    work = _Work(body, cameras, frames, fps, silhouettes_of, settings or RefinementSettings())
+    for rows in consecutive(frames):
         tried = set[int]()
         while inner := [
             part + rows.start
-            for part in stretches(body, found[rows], fps)[1:-1]
+            for part in stretches(body, mended[rows], fps)[1:-1]
             if len(part) <= LONGEST_S * fps and int(part[0]) + rows.start not in tried
         ]:
             part = min(inner, key=len)
             tried.add(int(part[0]))
-            turned = work.turned(part, found)
+            turned = work.turned(part, mended)
             if turned is not None:
-                found[part] = turned
+                mended[part] = turned
                 turns.append(Turn(int(frames[part[0]]), int(frames[part[-1]])))
-    return found, tuple(sorted(turns, key=lambda turn: turn.first))
+    return mended, tuple(sorted(turns, key=lambda turn: turn.first))
 
 
 def stretches(body: BodyModel, poses: Array, fps: float) -> list[Indices]:
@@ -103,12 +104,6 @@ def stretches(body: BodyModel, poses: Array, fps: float) -> list[Indices]:
     return np.split(np.arange(len(poses), dtype=np.int64), at)
 
 
-def _unbroken(frames: Indices) -> list[slice]:
-    """The rows of frames that follow each other."""
-    at = [0, *(1 + np.flatnonzero(np.diff(frames) > 1)).tolist(), len(frames)]
-    return [slice(first, after) for first, after in itertools.pairwise(at)]
-
-
 class _Work:
     def __init__(
         self,
@@ -117,10 +112,10 @@ class _Work:
         frames: Indices,
         fps: float,
         silhouettes_of: SilhouettesOf,
+        settings: RefinementSettings,
     ) -> None:
-        self._body, self._frames, self._fps, self._silhouettes_of = body, frames, fps, silhouettes_of
-        self._cameras = {camera.name: camera for camera in cameras}
-        self._tools: dict[tuple[str, ...], tuple[Refiner, Agreement]] = {}
+        self._body, self._frames, self._fps = body, frames, fps
+        self._rows = rows_seen(body, cameras, frames, silhouettes_of, settings)
 
     def turned(self, rows: Indices, poses: Array) -> Array | None:
         """(R, D) the body turned round in some rows of poses (K, D), between two others; None if they do not lead
@@ -152,13 +147,5 @@ class _Work:
         return redrawn(rng, best, seen, turn=False)[0]
 
     def _seen(self, row: int) -> SeenFrame:
-        views = self._silhouettes_of(int(self._frames[row]))
-        names = tuple(views)
-        if names not in self._tools:
-            cameras = tuple(self._cameras[name] for name in names)
-            self._tools[names] = (
-                Refiner(self._body, cameras, RefinementSettings()),
-                Agreement(self._body, cameras),
-            )
-        refiner, agreement = self._tools[names]
-        return SeenFrame(refiner, agreement, tuple(views.values()))
+        refiner, silhouettes = self._rows(row)
+        return SeenFrame(refiner, Agreement(self._body, refiner.cameras), silhouettes)
