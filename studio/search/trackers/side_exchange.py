@@ -12,9 +12,11 @@ Over the frames the best path is found (A. Viterbi, "Error bounds for convolutio
     Σ -g w [exchanged]  +  MOTION Σ log(1 + (d / σ)²)  +  CHANGE [sides change],      w = REFERENCE_FPS / fps
 
 d : how far the pair's ends move from frame to frame along the path, σ : how far they usually do; so sides change where
-limbs meet, or where the tracker jumped. For the whole body g also counts whether it walks backwards. Not every frame is
-examined: some a second, those where the track jumps, and, where an exchange is not clearly ruled out, the frames around
-until it is.
+limbs meet, or where the tracker jumped. For the whole body g also counts whether it walks backwards, and of an animal
+each turn that it cannot make between two frames costs TURN (`impossible_turns`): one that stands up looks much the same
+from its back and from its belly, and in its first frames masks that lack a foot were enough to turn it. Not every frame
+is examined: some a second, those where the track jumps, and, where an exchange is not clearly ruled out, the frames
+around until it is.
 
 Measured on thirteen rendered clips, default tracker: legs of a sound pose exchanged have g below -0.03 in every frame
 examined of twelve clips (-0.2 to -0.7 on the mean), in the one with clutter and a wrong calibration 0 at the most and
@@ -38,6 +40,8 @@ from studio.foundations.errors import BodyError
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
+from studio.search.trackers.frame_refinement import has_tail
+from studio.search.trackers.impossible_turns import TURN, turned_too_fast
 from studio.search.trackers.refinement import RefinementSettings
 
 GRID_S, BODY_GRID_S = 0.1, 0.5
@@ -307,6 +311,18 @@ class _Work:
             for after in (0, 1):
                 distances = moved(both[after][1:], both[before][:-1])
                 costs[:, before, after] = MOTION * np.log1p((distances / usual) ** 2)
+        return costs + self._turns(kind)
+
+    def _turns(self, kind: Kind) -> Array:
+        """(K - 1, 2, 2) cost of turning faster than an animal can, as in `_movements`; 0 of what is none."""
+        costs = np.zeros((len(self.frames) - 1, 2, 2))
+        if not (kind.whole and has_tail(self.body)):
+            return costs
+        both, seconds = [self.poses, self._kinds[kind].poses], np.diff(self.frames) / self._fps
+        for before in (0, 1):
+            for after in (0, 1):
+                turned = turned_too_fast(self.body, both[before][:-1], both[after][1:], seconds)
+                costs[:, before, after] = TURN * turned
         return costs
 
     def _backwards(self) -> Array:

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from studio.body.branches import within_limits
-from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
 from studio.evidence.volume.alignment import root_parameters
 from studio.foundations.arrays import Array, Indices, consecutive
@@ -26,15 +25,12 @@ from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
 from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, has_tail, redrawn, turned_pose
+from studio.search.trackers.impossible_turns import TURN, turned_too_fast
 from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.side_exchange import MOST_GAIN, MOST_SHARE, REFERENCE_FPS
 
-HALF_WAY = np.pi / 2.0
-"""rad: two frames that differ by more are nearer to each other once one is turned half round."""
 LONGEST_S = 0.25
 """Seconds of the longest part that is turned back."""
-TURN = 1.0
-"""What one impossible turn costs: as the change of sides where they move by twenty times what is usual."""
 DRAWN = 0x7B4C
 
 
@@ -89,18 +85,8 @@ def stretches(body: BodyModel, poses: Array, fps: float) -> list[Indices]:
     """The rows of poses (K, D) of frames that follow each other, in parts between which the body turns faster than it
     can.
     """
-    root = next(number for number, joint in enumerate(body.joints) if joint.parent < 0)
-    turned = joint_frames(body, poses)[:, root, :, :3]
-    cosines = 0.5 * (np.einsum("nij,nij->n", turned[1:], turned[:-1]) - 1.0)
-    angles = np.arccos(np.clip(cosines, -1.0, 1.0))
-    own = root_parameters(body).tolist()
-    steps = [
-        entry.max_step
-        for number, entry in enumerate(body.parameters)
-        if number in own and body.angles[number]
-    ]
-    fastest = max((step for step in steps if np.isfinite(step)), default=0.0) / fps
-    at = 1 + np.flatnonzero(angles > max(HALF_WAY, fastest))
+    seconds = np.full(len(poses) - 1, 1.0 / fps)
+    at = 1 + np.flatnonzero(turned_too_fast(body, poses[:-1], poses[1:], seconds))
     return np.split(np.arange(len(poses), dtype=np.int64), at)
 
 

@@ -389,3 +389,28 @@ def test_nothing_is_seen_without_border() -> None:
         views = (SimpleNamespace(border=[]), SimpleNamespace(border=border))
         work._sight = lambda row, views=views: (refiner, views)
         assert work._loss(0, work.poses[0]) == loss
+
+
+def test_an_animal_that_stands_up_cannot_turn_about_itself_between_two_frames_and_people_can() -> None:
+    """At 400 degrees a second it turns half round in half a second."""
+    mouse, turn = load_body("mouse31"), 1.0
+    names = [entry.name for entry in mouse.parameters]
+    reared = np.repeat(mouse.neutral[None], 4, axis=0)
+    reared[:, names.index("pitch")] = np.radians(-85.0)
+    # The search itself turned it in the last frame.
+    reared[3, names.index("heading")] = np.pi
+    whole = kinds_of(mouse)[0]
+    assert whole.whole
+    exchanged = reared.copy()
+    exchanged[:, names.index("heading")] += np.pi
+    work = work_on(reared, np.array([0, 1, 61, 62]), 120.0, whole)
+    work.body, work._kinds[whole].poses = mouse, exchanged
+    costs = work._turns(whole)
+    sudden, slow = [[0.0, turn], [turn, 0.0]], np.zeros((2, 2))
+    np.testing.assert_array_equal(costs, [sudden, slow, [[turn, 0.0], [0.0, turn]]])
+    # It stays in its place, so that nothing else costs anything.
+    np.testing.assert_array_equal(work._movements(whole), costs)
+
+    person = work_on(np.repeat(BODY.neutral[None], 2, axis=0), None, 120.0, WHOLE)
+    person._kinds[WHOLE].poses = person.poses + np.pi
+    assert not person._turns(WHOLE).any()
