@@ -4,6 +4,8 @@ Both ends of an animal look alike, and so do the back and the belly of one that 
 the other turns the body half round from one frame to the next, which no animal does.
 """
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,3 +38,14 @@ def turned_too_fast(body: BodyModel, before: Array, after: Array, seconds: Array
     ]
     fastest = max((step for step in steps if np.isfinite(step)), default=0.0)
     return np.asarray(angles > np.maximum(HALF_WAY, fastest * seconds), dtype=np.bool_)
+
+
+def costs_of_turning(body: BodyModel, both: tuple[Array, Array], seconds: Array) -> Array:
+    """(K - 1, 2, 2) TURN for each impossible turn from a row to the next, by which of `both` poses (K, D) each row has.
+
+    seconds : (K - 1,) between the rows.
+    """
+    costs = np.zeros((len(seconds), 2, 2))
+    for before, after in itertools.product((0, 1), repeat=2):
+        costs[:, before, after] = TURN * turned_too_fast(body, both[before][:-1], both[after][1:], seconds)
+    return costs

@@ -41,7 +41,7 @@ from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
 from studio.search.trackers.frame_refinement import has_tail
-from studio.search.trackers.impossible_turns import TURN, turned_too_fast
+from studio.search.trackers.impossible_turns import costs_of_turning
 from studio.search.trackers.refinement import RefinementSettings
 
 GRID_S, BODY_GRID_S = 0.1, 0.5
@@ -302,27 +302,14 @@ class _Work:
 
     def _movements(self, kind: Kind) -> Array:
         """(K - 1, 2, 2) cost of moving from tracked, exchanged (before) to tracked, exchanged (after)."""
-        both = [self._ends(kind, self.poses), self._ends(kind, self._kinds[kind].poses)]
-        costs = np.zeros((len(self.frames) - 1, 2, 2))
-        if not len(costs):
-            return costs
-        usual = self._usual(both[0]) * np.diff(self.frames)
-        for before in (0, 1):
-            for after in (0, 1):
-                distances = moved(both[after][1:], both[before][:-1])
-                costs[:, before, after] = MOTION * np.log1p((distances / usual) ** 2)
-        return costs + self._turns(kind)
-
-    def _turns(self, kind: Kind) -> Array:
-        """(K - 1, 2, 2) cost of turning faster than an animal can, as in `_movements`; 0 of what is none."""
-        costs = np.zeros((len(self.frames) - 1, 2, 2))
-        if not (kind.whole and has_tail(self.body)):
-            return costs
-        both, seconds = [self.poses, self._kinds[kind].poses], np.diff(self.frames) / self._fps
-        for before in (0, 1):
-            for after in (0, 1):
-                turned = turned_too_fast(self.body, both[before][:-1], both[after][1:], seconds)
-                costs[:, before, after] = TURN * turned
+        poses = self.poses, self._kinds[kind].poses
+        ends = self._ends(kind, poses[0]), self._ends(kind, poses[1])
+        if len(self.frames) < 2:
+            return np.zeros((0, 2, 2))
+        apart = np.diff(self.frames)
+        costs = costs_of_moving(ends, self._usual(ends[0]) * apart)
+        if kind.whole and has_tail(self.body):
+            costs += costs_of_turning(self.body, poses, apart / self._fps)
         return costs
 
     def _backwards(self) -> Array:
@@ -384,6 +371,17 @@ def best_path(gains: Array, movements: Array) -> tuple[NDArray[np.bool_], float]
     for row in range(len(gains) - 1, -1, -1):
         found[row], label = label == 1, int(came[row, label])
     return found, gained
+
+
+def costs_of_moving(ends: tuple[Array, Array], usual: Array) -> Array:
+    """(K - 1, 2, 2) costs of moving from a row to the next, by which of two sets of limbs' ends (K, P, 3) each row has.
+
+    usual : (K - 1,) σ times the frames between the rows.
+    """
+    costs = np.zeros((len(usual), 2, 2))
+    for before, after in itertools.product((0, 1), repeat=2):
+        costs[:, before, after] = MOTION * np.log1p((moved(ends[after][1:], ends[before][:-1]) / usual) ** 2)
+    return costs
 
 
 def moved(after: Array, before: Array) -> Array:

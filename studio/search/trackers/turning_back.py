@@ -9,7 +9,13 @@ fits better. That is kept if both turns are gone with it, and if it costs less t
 
     Σ w log(loss turned round / loss as tracked), cut off at ±1, over the part's frames  <  2 TURN,      w = 30 / fps.
 
-The shortest part comes first; longer ones are left to `side_exchange`, which needs more frames to tell.
+The shortest part comes first.
+
+A search also follows an animal that whips round too late, drifts off and turns in one frame to where it is by then; and
+at a clip's end nothing turns it back. So at each turn that is left the pose behind it is carried back, and the one
+before it on to what follows, frame by frame and again for at most LONGEST_S. The best path through what was tracked and
+what was carried (`best_path`) is taken, with the costs of `side_exchange` and TURN for each impossible turn: where the
+carried poses join the tracked ones, or the clip ends, that turn is saved. The first frame stays, where it was started.
 """
 
 from collections.abc import Sequence
@@ -18,16 +24,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from studio.body.branches import within_limits
+from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.evidence.volume.alignment import root_parameters
 from studio.foundations.arrays import Array, Indices, consecutive
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
 from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, has_tail, redrawn, turned_pose
-from studio.search.trackers.impossible_turns import TURN, turned_too_fast
+from studio.search.trackers.impossible_turns import TURN, costs_of_turning, turned_too_fast
 from studio.search.trackers.refinement import RefinementSettings
-from studio.search.trackers.side_exchange import MOST_GAIN, MOST_SHARE, REFERENCE_FPS
+from studio.search.trackers.side_exchange import (
+    MOST_GAIN,
+    MOST_SHARE,
+    NEAR_MM,
+    REFERENCE_FPS,
+    STILL_MM_S,
+    best_path,
+    costs_of_moving,
+    moved,
+)
 
 LONGEST_S = 0.25
 """Seconds of the longest part that is turned back."""
@@ -36,15 +53,16 @@ DRAWN = 0x7B4C
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Frames first to last (inclusive) in which the body was turned round."""
+    """Frames first to last (inclusive) in which the body was turned round. like : as which other frames."""
 
     first: int
     last: int
+    like: str = "before and after"
 
     @property
     def words(self) -> str:
         """Text for a run's notes."""
-        return f"frames {self.first} to {self.last}: turned round, as the frames before and after point"
+        return f"frames {self.first} to {self.last}: turned round, as the frames {self.like} point"
 
 
 def with_facing_right(
@@ -78,6 +96,12 @@ def with_facing_right(
             if turned is not None:
                 mended[part] = turned
                 turns.append(Turn(int(frames[part[0]]), int(frames[part[-1]])))
+        for at in [int(part[0]) + rows.start for part in stretches(body, mended[rows], fps)[1:]]:
+            left = turned_too_fast(body, mended[at - 1 : at], mended[at : at + 1], np.array([1.0 / fps]))[0]
+            carried = work.joined(at, rows, mended) if left else None
+            if carried is not None:
+                changed, mended[carried[0]], like = *carried, "after" if carried[0][0] < at else "before"
+                turns.append(Turn(int(frames[changed[0]]), int(frames[changed[-1]]), like))
     return mended, tuple(sorted(turns, key=lambda turn: turn.first))
 
 
@@ -121,16 +145,69 @@ class _Work:
             return None
         return around[1:-1]
 
+    def joined(self, at: int, rows: slice, poses: Array) -> tuple[Indices, Array] | None:
+        """Rows (R,) beside an impossible turn to row `at` of poses (K, D), and their poses (R, D), carried from the
+        other side of the turn to where they join what was tracked; None where that costs more. rows : that follow each
+        other.
+        """
+        most = max(1, round(LONGEST_S * self._fps))
+        behind = range(at - 1, max(rows.start, at - 1 - most), -1)
+        ahead = range(at, min(rows.stop, at + most))
+        found = [self._carried(poses[at], behind, poses), self._carried(poses[at - 1], ahead, poses)]
+        gained, changed, carried = max(found, key=lambda one: one[0])
+        return (changed, carried) if gained > 0.0 else None
+
+    def _carried(self, beside: Array, order: range, poses: Array) -> tuple[float, Indices, Array]:
+        """What is gained on the best path by a pose (D,) that is carried over rows in this order, the rows in which
+        it is taken, and their poses.
+        """
+        nothing = 0.0, np.zeros(0, dtype=np.int64), poses[:0]
+        if not order:
+            return nothing
+        window = np.arange(max(min(order) - 1, 0), min(max(order) + 2, len(poses)))
+        carried, gains = poses[window].copy(), np.full(len(window), np.nan)
+        share = min(REFERENCE_FPS / self._fps, MOST_SHARE)
+        for row in order:
+            seen = self._seen(row)
+            here, own = row - window[0], self._refined(poses[row], seen).loss
+            other = self._refined(beside, seen)
+            if other.loss > own:
+                other = self._redrawn(row, other, seen)
+            beside, there = other.pose, other.loss
+            gain = np.log(own / there) if min(own, there) > 0.0 else 0.0
+            carried[here], gains[here] = beside, share * np.clip(gain, -MOST_GAIN, MOST_GAIN)
+            joined = moved(self._ends(beside[None]), self._ends(poses[row][None]))[0] < NEAR_MM
+            if joined or np.nansum(gains) < -2.0 * TURN:
+                break
+        both = poses[window], carried
+        apart = np.diff(self._frames[window])
+        costs = costs_of_moving((self._ends(both[0]), self._ends(both[1])), self._usual(poses) * apart)
+        costs += costs_of_turning(self._body, both, apart / self._fps)
+        taken, gained = best_path(gains, costs)
+        return (gained, window[taken], carried[taken]) if taken.any() else nothing
+
+    def _ends(self, poses: Array) -> Array:
+        """(K, P, 3) ends of the limbs, mm at a person's size (`scale_of`)."""
+        return limb_ends(self._body, poses).reshape(len(poses), -1, 3) / scale_of(self._body)
+
+    def _usual(self, poses: Array) -> float:
+        """σ, mm a frame."""
+        ends = self._ends(poses)
+        return max(float(np.median(moved(ends[1:], ends[:-1]))), STILL_MM_S / self._fps)
+
     def _turned_in(self, row: int, pose: Array, seen: SeenFrame, beside: Array) -> Hypothesis:
         """A row's pose turned round, or that of the row beside it, refined, its limbs drawn again."""
         starts = [one for one in (turned_pose(self._body, pose), beside) if one is not None]
-        refined = [
-            seen.hypothesis(seen.refiner.refine(within_limits(self._body, one), seen.silhouettes).pose)
-            for one in starts
-        ]
-        best = min(refined, key=lambda one: one.loss)
+        best = min((self._refined(one, seen) for one in starts), key=lambda one: one.loss)
+        return self._redrawn(row, best, seen)
+
+    def _refined(self, pose: Array, seen: SeenFrame) -> Hypothesis:
+        return seen.hypothesis(seen.refiner.refine(within_limits(self._body, pose), seen.silhouettes).pose)
+
+    def _redrawn(self, row: int, pose: Hypothesis, seen: SeenFrame) -> Hypothesis:
+        """A row's pose with its doubtful limbs drawn again."""
         rng = np.random.default_rng(np.random.SeedSequence((int(self._frames[row]), DRAWN)))
-        return redrawn(rng, best, seen, turn=False)[0]
+        return redrawn(rng, pose, seen, turn=False)[0]
 
     def _seen(self, row: int) -> SeenFrame:
         refiner, silhouettes = self._rows(row)

@@ -77,23 +77,38 @@ def test_a_clip_in_which_it_never_turns_is_unchanged() -> None:
     np.testing.assert_array_equal(found, WALK)
 
 
-def test_what_has_no_end_on_both_sides_or_is_long_is_left() -> None:
-    # Nothing says which of two parts is wrong, and a gap may hide a turn.
-    for planted, frames in (
-        (turned_in(5, 6, 7), FRAMES),
-        (turned_in(3, 4), FRAMES + np.array([0, 0, 0, 5, 5, 9, 9, 9])),
-    ):
-        found, turns = right(planted, frames)
-        assert turns == ()
-        np.testing.assert_array_equal(found, planted)
-    # Three frames are a quarter of a second or more at ten frames a second.
-    found, turns = right(turned_in(3, 4, 5), fps=10.0)
+def test_a_turn_that_nothing_turns_back_is_carried_to_the_end_of_the_clip() -> None:
+    planted = turned_in(5, 6, 7)
+    found, turns = right(planted)
+    assert [(turn.first, turn.last, turn.like) for turn in turns] == [(105, 107, "before")]
+    assert off(found).max() < 15.0
+    np.testing.assert_array_equal(found[:5], planted[:5])
+    assert turns[0].words == "frames 105 to 107: turned round, as the frames before point"
+
+
+def test_a_body_that_drifts_off_and_turns_in_one_frame_is_carried_back_to_where_it_was_lost() -> None:
+    """It goes about in four frames; the search follows with a part of that to the wrong side, until it turns."""
+    drifted, heading = WALK.copy(), NAMES.index("heading")
+    drifted[2:6, heading] += np.radians([45.0, 80.0, 110.0, 130.0])
+    assert len(stretches(MOUSE, drifted, FPS)) == 2
+    found, turns = right(drifted)
+    assert [turn.like for turn in turns] == ["after"]
+    assert 102 <= turns[0].first <= 104
+    assert turns[0].last == 105
+    assert off(found)[3:].max() < 15.0
+
+
+def test_the_first_frame_is_where_the_clip_was_started_and_a_gap_may_hide_a_turn() -> None:
+    planted = turned_in(0)
+    np.testing.assert_array_equal(right(planted)[0], planted)
+    apart = FRAMES + np.array([0, 0, 0, 5, 5, 9, 9, 9])
+    found, turns = right(turned_in(3, 4), apart)
     assert turns == ()
-    np.testing.assert_array_equal(found, turned_in(3, 4, 5))
+    np.testing.assert_array_equal(found, turned_in(3, 4))
 
 
 def test_a_turn_that_the_pictures_show_stays() -> None:
-    really = turned_in(2, 3, 4, 5, 6)
+    really = turned_in(*range(3, 8))
 
     def shown(frame: int) -> Mapping[str, SilhouetteDistances]:
         return silhouettes_by_camera(drawn_evidence(MOUSE, really[frame - FRAMES[0]], CAMERAS), 150)
