@@ -11,11 +11,12 @@ fits better. That is kept if both turns are gone with it, and if it costs less t
 
 The shortest part comes first.
 
-A search also follows an animal that whips round too late, drifts off and turns in one frame to where it is by then; and
-at a clip's end nothing turns it back. So at each turn that is left the pose behind it is carried back, and the one
-before it on to what follows, frame by frame and again for at most LONGEST_S. The best path through what was tracked and
-what was carried (`best_path`) is taken, with the costs of `side_exchange` and TURN for each impossible turn: where the
-carried poses join the tracked ones, or the clip ends, that turn is saved. The first frame stays, where it was started.
+A search also follows an animal that whips round too late, drifts off and turns in one frame to where it is by then; one
+that was started the wrong way turns soon; and at a clip's end nothing turns it back. So at each turn that is left the
+pose behind it is carried back, and the one before it on to what follows, frame by frame and again for at most
+LONGEST_S. The best path through what was tracked and what was carried (`best_path`) is taken, with the costs of
+`side_exchange` and TURN for each impossible turn: where the carried poses join the tracked ones, or the clip begins or
+ends, that turn is saved.
 """
 
 from collections.abc import Sequence
@@ -96,9 +97,15 @@ def with_facing_right(
             if turned is not None:
                 mended[part] = turned
                 turns.append(Turn(int(frames[part[0]]), int(frames[part[-1]])))
-        for at in [int(part[0]) + rows.start for part in stretches(body, mended[rows], fps)[1:]]:
-            left = turned_too_fast(body, mended[at - 1 : at], mended[at : at + 1], np.array([1.0 / fps]))[0]
-            carried = work.joined(at, rows, mended) if left else None
+        tried.clear()
+        while later := [
+            part[0] + rows.start
+            for part in stretches(body, mended[rows], fps)[1:]
+            if int(part[0]) + rows.start not in tried
+        ]:
+            at = int(later[0])
+            tried.add(at)
+            carried = work.joined(at, rows, mended)
             if carried is not None:
                 changed, mended[carried[0]], like = *carried, "after" if carried[0][0] < at else "before"
                 turns.append(Turn(int(frames[changed[0]]), int(frames[changed[-1]]), like))
@@ -151,7 +158,7 @@ class _Work:
         other.
         """
         most = max(1, round(LONGEST_S * self._fps))
-        behind = range(at - 1, max(rows.start, at - 1 - most), -1)
+        behind = range(at - 1, max(rows.start - 1, at - 1 - most), -1)
         ahead = range(at, min(rows.stop, at + most))
         found = [self._carried(poses[at], behind, poses), self._carried(poses[at - 1], ahead, poses)]
         gained, changed, carried = max(found, key=lambda one: one[0])

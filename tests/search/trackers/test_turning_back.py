@@ -98,9 +98,13 @@ def test_a_body_that_drifts_off_and_turns_in_one_frame_is_carried_back_to_where_
     assert off(found)[3:].max() < 15.0
 
 
-def test_the_first_frame_is_where_the_clip_was_started_and_a_gap_may_hide_a_turn() -> None:
-    planted = turned_in(0)
-    np.testing.assert_array_equal(right(planted)[0], planted)
+def test_a_clip_that_was_started_the_wrong_way_and_turns_soon_is_right_from_its_first_frame() -> None:
+    found, turns = right(turned_in(0, 1))
+    assert [(turn.first, turn.last, turn.like) for turn in turns] == [(100, 101, "after")]
+    assert off(found).max() < 15.0
+
+
+def test_a_gap_may_hide_a_turn() -> None:
     apart = FRAMES + np.array([0, 0, 0, 5, 5, 9, 9, 9])
     found, turns = right(turned_in(3, 4), apart)
     assert turns == ()
