@@ -12,8 +12,9 @@ SilhouettesOf = Callable[[int], Mapping[str, Distances]]
 """The silhouettes of a frame by camera."""
 RowSeen = Callable[[int], tuple[Refiner, tuple[Distances, ...]]]
 """What refines poses in the cameras that see a row, and the silhouettes in these."""
-KEPT_SILHOUETTES = 96
-"""Rows that are kept."""
+KEPT_SILHOUETTES = 256
+"""Rows that are kept: two seconds at 120 Hz, the longest stretch that is bridged, with what lies around it. With fewer
+each of the nine margins tried there reads all its frames again."""
 
 
 def rows_seen(
