@@ -3,6 +3,8 @@
 import functools
 from collections.abc import Callable, Mapping, Sequence
 
+from cachetools import LRUCache, cached
+
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Indices
 from studio.foundations.geometry.camera import Camera
@@ -12,9 +14,9 @@ SilhouettesOf = Callable[[int], Mapping[str, Distances]]
 """The silhouettes of a frame by camera."""
 RowSeen = Callable[[int], tuple[Refiner, tuple[Distances, ...]]]
 """What refines poses in the cameras that see a row, and the silhouettes in these."""
-KEPT_SILHOUETTES = 256
-"""Rows that are kept: two seconds at 120 Hz, the longest stretch that is bridged, with what lies around it. With fewer
-each of the nine margins tried there reads all its frames again."""
+KEPT_BYTES = 512 * 2**20
+"""Of the rows that were seen last: two seconds at 120 Hz of four pictures of 1280 by 720, the longest stretch that is
+bridged. With fewer each of the nine margins tried there reads all its frames again."""
 
 
 def rows_seen(
@@ -31,9 +33,13 @@ def rows_seen(
     def refiner(names: tuple[str, ...]) -> Refiner:
         return Refiner(body, tuple(by_name[name] for name in names), settings)
 
-    @functools.lru_cache(KEPT_SILHOUETTES)
+    @cached(LRUCache[int, tuple[Refiner, tuple[Distances, ...]]](KEPT_BYTES, _bytes_of))
     def seen(row: int) -> tuple[Refiner, tuple[Distances, ...]]:
         views = silhouettes_of(int(frames[row]))
         return refiner(tuple(views)), tuple(views.values())
 
     return seen
+
+
+def _bytes_of(seen: tuple[Refiner, tuple[Distances, ...]]) -> int:
+    return sum(view.signed.nbytes + view.border.nbytes + view.outward.nbytes for view in seen[1])
