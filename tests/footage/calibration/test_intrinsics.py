@@ -3,6 +3,7 @@
 import dataclasses
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from board_footage import BoardRenderer, close_boards
@@ -50,6 +51,17 @@ def test_focal_length_within_half_a_percent(seed: int) -> None:
     assert abs(lens.matrix[0, 0] - CAMERA.matrix[0, 0]) < 4.0 * lens.focal_deviation
     assert blocking(lens_findings(lens)) == ()
     assert "aspect" in lens.model
+
+
+def test_the_same_pictures_give_the_same_lens_to_the_last_bit_on_any_number_of_threads() -> None:
+    sightings = sightings_of(CAMERA, close_boards(np.random.default_rng(0), CHARUCO, CAMERA, 24))
+    threads, found = cv2.getNumThreads(), set[bytes]()
+    for asked in (1, 2, 4, 4, 4):
+        cv2.setNumThreads(asked)
+        lens = solve_lens(CHARUCO, sightings)
+        found.add(lens.matrix.tobytes() + lens.distortion.tobytes())
+    cv2.setNumThreads(threads)
+    assert len(found) == 1
 
 
 @pytest.mark.slow
