@@ -217,7 +217,7 @@ def _solved(
     points = board.points
     middle = (np.array(size) - 1.0) / 2.0 if centre is None else centre
     start = np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
-    # Its threads add up in whatever order they end: a lens that differs in the eleventh digit starts another search.
+    # OpenCV's threads add up in whatever order they end: a lens other in its eleventh digit starts another search.
     cv2.setNumThreads(1)
     rms, matrix, distortion, turns, _, deviations, _, of_picture = cv2.calibrateCameraExtended(
         [points[detection.ids].astype(np.float32) for detection in detections],

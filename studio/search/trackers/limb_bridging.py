@@ -32,8 +32,8 @@ from studio.search.trackers.side_exchange import (
     MOTION,
     NEAR_MM,
     REFERENCE_FPS,
-    STILL_MM_S,
     moved,
+    usual_movement,
 )
 
 JUMP_MM, SPREADS, TIMES, AROUND = 60.0, 8.0, 4.0, 12
@@ -201,8 +201,7 @@ class _Work:
 
     def _usual(self, limb: str) -> float:
         """σ, mm a frame."""
-        ends = self._ends(limb, self.poses)
-        return max(float(np.median(moved(ends[1:], ends[:-1]))), STILL_MM_S / self._fps)
+        return usual_movement(self._ends(limb, self.poses), self._fps)
 
     def _jumps(self, limb: str) -> NDArray[np.bool_]:
         """(K,) rows in which a limb's ends jump."""

@@ -218,7 +218,7 @@ class _Work:
         """Rows that are always examined."""
         step = max(1, round((BODY_GRID_S if kind.whole else GRID_S) * self._fps))
         ends = self._ends(kind, self.poses)
-        jumped = moved(ends[1:], ends[:-1]) > JUMP * self._usual(ends)
+        jumped = moved(ends[1:], ends[:-1]) > JUMP * usual_movement(ends, self._fps)
         jumps = np.flatnonzero(jumped).tolist()
         return sorted({*range(0, len(ends), step), len(ends) - 1, *jumps, *(row + 1 for row in jumps)})
 
@@ -295,11 +295,6 @@ class _Work:
         ends = limb_ends(self.body, poses)[:, kind.limbs].reshape(len(poses), -1, 3)
         return ends / scale_of(self.body)
 
-    def _usual(self, ends: Array) -> float:
-        """σ, the usual movement, mm a frame."""
-        distances = moved(ends[1:], ends[:-1])
-        return max(float(np.median(distances)) if len(distances) else 0.0, STILL_MM_S / self._fps)
-
     def _movements(self, kind: Kind) -> Array:
         """(K - 1, 2, 2) cost of moving from tracked, exchanged (before) to tracked, exchanged (after)."""
         poses = self.poses, self._kinds[kind].poses
@@ -307,7 +302,7 @@ class _Work:
         if len(self.frames) < 2:
             return np.zeros((0, 2, 2))
         apart = np.diff(self.frames)
-        costs = costs_of_moving(ends, self._usual(ends[0]) * apart)
+        costs = costs_of_moving(ends, usual_movement(ends[0], self._fps) * apart)
         if kind.whole and has_tail(self.body):
             costs += costs_of_turning(self.body, poses, apart / self._fps)
         return costs
@@ -387,3 +382,9 @@ def costs_of_moving(ends: tuple[Array, Array], usual: Array) -> Array:
 def moved(after: Array, before: Array) -> Array:
     """(...) root mean square distance of points (..., P, 3)."""
     return np.sqrt(np.square(after - before).sum(axis=-1).mean(axis=-1))
+
+
+def usual_movement(ends: Array, fps: float) -> float:
+    """σ, how far ends (K, P, 3) usually move in a frame, mm at a person's size."""
+    distances = moved(ends[1:], ends[:-1])
+    return max(float(np.median(distances)) if len(distances) else 0.0, STILL_MM_S / fps)

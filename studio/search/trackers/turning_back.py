@@ -19,6 +19,7 @@ LONGEST_S. The best path through what was tracked and what was carried (`best_pa
 ends, that turn is saved.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -41,10 +42,10 @@ from studio.search.trackers.side_exchange import (
     MOST_SHARE,
     NEAR_MM,
     REFERENCE_FPS,
-    STILL_MM_S,
     best_path,
     costs_of_moving,
     moved,
+    usual_movement,
 )
 
 LONGEST_S = 0.25
@@ -133,6 +134,7 @@ class _Work:
     ) -> None:
         self._body, self._frames, self._fps = body, frames, fps
         self._rows = rows_seen(body, cameras, frames, silhouettes_of, settings)
+        self._agreement = functools.cache(functools.partial(Agreement, body))
 
     def turned(self, rows: Indices, poses: Array) -> Array | None:
         """(R, D) the body turned round in some rows of poses (K, D), between two others; None if they do not lead
@@ -160,8 +162,8 @@ class _Work:
         most = max(1, round(LONGEST_S * self._fps))
         behind = range(at - 1, max(rows.start - 1, at - 1 - most), -1)
         ahead = range(at, min(rows.stop, at + most))
-        found = [self._carried(poses[at], behind, poses), self._carried(poses[at - 1], ahead, poses)]
-        gained, changed, carried = max(found, key=lambda one: one[0])
+        ways = self._carried(poses[at], behind, poses), self._carried(poses[at - 1], ahead, poses)
+        gained, changed, carried = max(ways, key=lambda way: way[0])
         return (changed, carried) if gained > 0.0 else None
 
     def _carried(self, beside: Array, order: range, poses: Array) -> tuple[float, Indices, Array]:
@@ -188,7 +190,9 @@ class _Work:
                 break
         both = poses[window], carried
         apart = np.diff(self._frames[window])
-        costs = costs_of_moving((self._ends(both[0]), self._ends(both[1])), self._usual(poses) * apart)
+        costs = costs_of_moving(
+            (self._ends(both[0]), self._ends(both[1])), usual_movement(self._ends(poses), self._fps) * apart
+        )
         costs += costs_of_turning(self._body, both, apart / self._fps)
         taken, gained = best_path(gains, costs)
         return (gained, window[taken], carried[taken]) if taken.any() else nothing
@@ -196,11 +200,6 @@ class _Work:
     def _ends(self, poses: Array) -> Array:
         """(K, P, 3) ends of the limbs, mm at a person's size (`scale_of`)."""
         return limb_ends(self._body, poses).reshape(len(poses), -1, 3) / scale_of(self._body)
-
-    def _usual(self, poses: Array) -> float:
-        """σ, mm a frame."""
-        ends = self._ends(poses)
-        return max(float(np.median(moved(ends[1:], ends[:-1]))), STILL_MM_S / self._fps)
 
     def _turned_in(self, row: int, pose: Array, seen: SeenFrame, beside: Array) -> Hypothesis:
         """A row's pose turned round, or that of the row beside it, refined, its limbs drawn again."""
@@ -218,4 +217,4 @@ class _Work:
 
     def _seen(self, row: int) -> SeenFrame:
         refiner, silhouettes = self._rows(row)
-        return SeenFrame(refiner, Agreement(self._body, refiner.cameras), silhouettes)
+        return SeenFrame(refiner, self._agreement(refiner.cameras), silhouettes)

@@ -20,6 +20,7 @@ from studio.search.trackers.side_exchange import (
     best_path,
     kinds_of,
     moved,
+    usual_movement,
     with_sides_right,
 )
 from studio.search.trackers.start_candidates import facing
@@ -99,7 +100,7 @@ def test_a_limb_usually_moves_by_the_median_and_at_least_at_a_metre_a_second() -
         ((0.0,), 40.0),
     ):
         work = work_on(along_x(*places), fps=25.0)
-        assert work._usual(work.poses[:, None]) == pytest.approx(usual)
+        assert usual_movement(work.poses[:, None], work._fps) == pytest.approx(usual)
 
 
 @pytest.mark.parametrize(
