@@ -18,6 +18,7 @@ from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 
 CAMERAS = ring_of_cameras(4, 480, 360)
+THREE = ring_of_cameras(3, 480, 360)
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,20 @@ def test_an_arm_before_the_trunk_is_found_where_it_is(
     assert off(body, found, stretched, "RWrist") < 80.0
     assert off(body, found, stretched, "LWrist") < 80.0
     assert np.array_equal(found, limbs_put_right(body, CAMERAS, evidence, hidden, seed).pose)
+
+
+@pytest.mark.parametrize(("bent", "seed"), [(-1.8, 0), (-2.2, 0), (-2.2, 1)])
+def test_limbs_that_hardly_disagree_are_looked_for_too(body: BodyModel, bent: float, seed: int) -> None:
+    """An arm that hangs before the thigh, seen by three cameras, is thought to be folded before the chest: where only
+    limbs that disagree were looked for, its wrist ended 340 and 465 mm off.
+    """
+    hanging = {"left_shoulder_rx": 0.2, "right_shoulder_rx": -0.1, "left_elbow_ry": -0.2}
+    truth = standing(body, **hanging, right_elbow_ry=-0.2)
+    folded = standing(body, **hanging, right_elbow_ry=bent, right_shoulder_ry=-0.4)
+    assert off(body, folded, truth, "RWrist") > 250.0
+    found = limbs_put_right(body, THREE, drawn_evidence(body, truth, THREE), folded, seed).pose
+    assert off(body, found, truth, "RWrist") < 80.0
+    assert off(body, found, truth, "LWrist") < 30.0
 
 
 def test_a_pose_that_fits_is_not_lost(body: BodyModel, stretched: np.ndarray) -> None:

@@ -15,7 +15,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import Agreement
-from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, redrawn
+from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, all_redrawn, has_tail, redrawn
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 
 ROUNDS = 3
@@ -42,5 +42,10 @@ def limbs_put_right(
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0x11B5)))
     best = frame.hypothesis(refiner.refine(within_limits(body, pose), frame.silhouettes).pose)
     for _ in range(ROUNDS):
-        best, _ = redrawn(rng, best, frame, turn=turn)
+        found, _ = redrawn(rng, best, frame, turn=turn)
+        if not has_tail(body):
+            found = all_redrawn(rng, found, frame)
+        if found is best:
+            break
+        best = found
     return best

@@ -57,10 +57,13 @@ BETTER = 0.85
 behind boxes: with 0.95, 117 mm instead of 40); for a lost limb the right place has a third to four fifths of the
 loss."""
 BETTER_CHAIN, BETTER_TURNED = 0.97, 0.95
-"""The same of a chain such as a tail, which has little of the border, and of the whole body turned round."""
+"""The same of a chain such as a tail, which has little of the border, or where every limb of a first pose is drawn; and
+of the whole body turned round."""
 MOST_TOGETHER, KEPT_ALONG, DRAWS_ALONG = 7, 6, 160
 """Angles of a limb that are drawn at once: draws of a tail of eight never lie on it. Of a longer one, how many poses
 are kept from joint to joint, and how many are drawn from each."""
+FEWEST_ANGLES, ALL_REFINED = 3, 8
+"""Where every limb is drawn, however little it disagrees: the least angles of one, and how many poses are refined."""
 REDRAWN = 0x11A6
 
 
@@ -258,13 +261,18 @@ class SeenFrame:
         return self.hypothesis(pose)
 
     def best_of(
-        self, than: Hypothesis, drawn: Array, own: Sequence[int], share: float = BETTER
+        self,
+        than: Hypothesis,
+        drawn: Array,
+        own: Sequence[int],
+        share: float = BETTER,
+        most: int = REFINED_DRAWS,
     ) -> Hypothesis:
         """The best of `than` and of the refined poses among those drawn (N, D) that disagree least with the
-        silhouettes. own : the angles that were drawn. share : as in `better`.
+        silhouettes. own : the angles that were drawn. share : as in `better`. most : how many are refined.
         """
         off = self.agreement.of_places(drawn, self.silhouettes)
-        for start in _best_apart(drawn, off, own, REFINED_DRAWS):
+        for start in _best_apart(drawn, off, own, most):
             than = self.better(than, start, share)
         return than
 
@@ -317,6 +325,23 @@ def redrawn(
     return found if found is began_with else frame.refine(found), evaluations
 
 
+def all_redrawn(rng: np.random.Generator, found: Hypothesis, frame: SeenFrame) -> Hypothesis:
+    """The hypothesis with each limb resampled, then both of a pair, however little they disagree: what a folded arm
+    leaves bare in one view of three may be too little to say so. Any lower loss counts, not only a much lower one.
+    """
+    names = list(found.off.shares())
+    twins = name_twins(names)
+    for number, limb in enumerate(names):
+        own = bent_by(frame.refiner, limb)
+        if len(own) < FEWEST_ANGLES:
+            continue
+        drawn = _drawn(rng, frame.refiner, found.pose[None], own)
+        found = frame.best_of(found, drawn, own, BETTER_CHAIN, ALL_REFINED)
+        if int(twins[number]) > number:
+            found = _both_redrawn(rng, found, frame, limb, BETTER_CHAIN, ALL_REFINED)[0]
+    return found
+
+
 def _chains(refiner: Refiner) -> list[str]:
     """Limbs that are drawn joint by joint: those of more angles than are drawn at once, of a body with a tail."""
     if not has_tail(refiner.body):
@@ -326,10 +351,11 @@ def _chains(refiner: Refiner) -> list[str]:
 
 
 def _doubts(off: Disagreement, chains: Sequence[str]) -> dict[str, float]:
-    """Disagreeing area by limb, as a share of its own. A chain that lies before the body disagrees with nothing, and
-    what it leaves bare is nearest to a limb that it hangs from: all that is bare may be a chain's.
+    """Disagreeing area by limb, as a share of its own, with what is bare in its reach. A chain that lies before the
+    body disagrees with nothing, and what it leaves bare is nearest to a limb that it hangs from: all that is bare may
+    be a chain's.
     """
-    shares, groups = off.shares(), np.array(off.limbs)
+    shares, groups = off.doubts(), np.array(off.limbs)
     for limb in chains:
         own = groups == limb
         area = np.maximum(off.area.sum(axis=0), LEAST_AREA)[own].sum()
@@ -338,7 +364,12 @@ def _doubts(off: Disagreement, chains: Sequence[str]) -> dict[str, float]:
 
 
 def _both_redrawn(
-    rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, limb: str
+    rng: np.random.Generator,
+    found: Hypothesis,
+    frame: SeenFrame,
+    limb: str,
+    share: float = BETTER,
+    most: int = REFINED_DRAWS,
 ) -> tuple[Hypothesis, int]:
     """The same with a lost limb and its twin resampled together: where an arm has taken the other's place, neither can
     move while the other stays. First the limb, leaving out the twin, then the twin for each of the limb's best
@@ -353,7 +384,7 @@ def _both_redrawn(
     places = _drawn(rng, refiner, found.pose[None], own)
     off = agreement.of_places(places, frame.silhouettes, without=twin)
     pairs = _drawn(rng, refiner, np.array(_best_apart(places, off, own, PAIRED_DRAWS)), others)
-    return frame.best_of(found, pairs, [*own, *others]), len(places) + len(pairs)
+    return frame.best_of(found, pairs, [*own, *others], share, most), len(places) + len(pairs)
 
 
 def bent_by(refiner: Refiner, limb: str) -> list[int]:

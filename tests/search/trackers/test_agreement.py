@@ -1,5 +1,7 @@
 """Disagreement of limbs and silhouettes, per limb and in both directions."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
@@ -7,7 +9,7 @@ from moving_bodies import standing
 
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouette_distances
-from studio.search.trackers.agreement import Agreement, limb_names
+from studio.search.trackers.agreement import Agreement, limb_names, without_bare
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 
 CAMERAS = ring_of_cameras(4, 480, 360)
@@ -68,3 +70,24 @@ def test_an_empty_view_leaves_every_limb_outside(body: BodyModel) -> None:
     found = agreement.of(truth, silhouette_distances(drawn_evidence(body, None, CAMERAS)))
     assert np.array_equal(found.outside, found.area)
     assert not found.bare.any()
+
+
+def test_what_lies_bare_beside_the_trunk_is_in_an_arms_reach(body: BodyModel) -> None:
+    """An arm that hangs, and is thought to be folded: most of what it leaves bare is nearer to the trunk."""
+    truth, folded = (standing(body, right_shoulder_rx=0.1, right_elbow_ry=bend) for bend in (0.0, -2.2))
+    agreement = Agreement(body, ring_of_cameras(3, 480, 360))
+    found = agreement.of(folded, silhouette_distances(drawn_evidence(body, truth, agreement.cameras)))
+    own = np.array(found.limbs) == "right arm"
+    whole, area = found.bare.sum(), found.area[:, own].sum()
+    assert found.bare[:, own].sum() < 0.3 * whole
+    assert found.within["right arm"] > 0.9 * whole
+    assert "root" not in found.within
+    doubts, shares = found.doubts(), found.shares()
+    expected = (found.outside[:, own].sum() + found.within["right arm"]) / area
+    assert doubts["right arm"] == pytest.approx(expected, rel=1e-6)
+    assert doubts["right arm"] > 3.0 * shares["right arm"]
+    assert doubts["root"] == shares["root"]
+    # Where the masks show much more than the body, they do not say which limb is off.
+    smeared = dataclasses.replace(found, bare=0.021 * found.area.sum() / whole * found.bare)
+    assert smeared.doubts() == smeared.shares()
+    assert not without_bare(found).within

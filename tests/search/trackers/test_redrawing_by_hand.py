@@ -150,7 +150,9 @@ class Told:
         self.asked.append(("better", float(start[0]), share))
         return self.after.get("last", than)
 
-    def best_of(self, than: Hypothesis, drawn: Array, own: list[int], share: float = 0.85) -> Hypothesis:
+    def best_of(
+        self, than: Hypothesis, drawn: Array, own: list[int], share: float = 0.85, most: int = 3
+    ) -> Hypothesis:
         limbs = {self.refiner.body.parameters[at].limb for at in own}
         self.asked.append(("best of", tuple(sorted(limbs)), len(drawn), share))
         return self.after.get("+".join(sorted(limbs)), than)
