@@ -17,7 +17,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import Agreement
-from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, all_redrawn, has_tail, redrawn
+from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, has_tail, redraw_all, redrawn
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 
 ROUNDS = 3
@@ -46,7 +46,7 @@ def limbs_put_right(
     for _ in range(ROUNDS):
         found, _ = redrawn(rng, best, frame, turn=turn)
         if not has_tail(body):
-            found = all_redrawn(rng, found, frame)
+            found = redraw_all(rng, found, frame)
         if found is best:
             break
         best = found

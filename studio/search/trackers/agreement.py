@@ -71,7 +71,7 @@ class Disagreement:
         off = (self.outside + self.bare).sum(axis=0)
         return {limb: float(off[own].sum()) / area for limb, own, area in self._limbs()}
 
-    def doubts(self) -> dict[str, float]:
+    def shares_in_reach(self) -> dict[str, float]:
         """The same with all that is bare in a limb's reach: an arm that lies before the trunk disagrees with nothing,
         and what it leaves bare may be nearest to a leg. Not where much is bare: masks that show more than the body do
         not say which limb is off.
@@ -100,6 +100,12 @@ class Agreement:
         self._limbs = limb_names(body)
         self._projector = OutlineProjector.of_body(body, cameras)
         self._meshes = MeshAgreement(body, cameras) if body.meshes else None
+        scale, self._reaches = scale_of(body), dict[str, tuple[int, float]]()
+        """By limb of several parts the first of the drawn ones, and its length, mm at a person's size."""
+        for name in dict.fromkeys(self._limbs):
+            own = [number for number, limb in enumerate(self._limbs) if limb == name]
+            if len(own) > 1:
+                self._reaches[name] = own[0], sum(abs(body.drawn[number].length) for number in own) / scale
 
     def corners(self, pose: Array) -> Array:
         """(V, L, 4, 2) pixels of the outlines of a pose (D,)."""
@@ -141,15 +147,12 @@ class Agreement:
         self, pose: Array, bare: Sequence[Array], steps: Sequence[int], sizes: Sequence[float]
     ) -> dict[str, float]:
         """mm² of the bare points of each view (K, 2) within the length of limbs of several parts from their roots."""
-        ends, found = limb_ends(self.body, pose[None])[0], dict[str, float]()
-        lengths, scale = np.array([abs(limb.length) for limb in self.body.drawn]), scale_of(self.body)
-        for limb in dict.fromkeys(self._limbs):
-            own = [number for number, name in enumerate(self._limbs) if name == limb]
-            if len(own) < 2:
-                continue
-            length, found[limb] = lengths[own].sum() / scale, 0.0
-            for camera, points, step, mm in zip(self.cameras, bare, steps, sizes, strict=True):
-                away = np.linalg.norm(points - project(camera, ends[own[:1], 0])[0], axis=1)
+        roots = limb_ends(self.body, pose[None])[0, :, 0]
+        found = dict.fromkeys(self._reaches, 0.0)
+        for camera, points, step, mm in zip(self.cameras, bare, steps, sizes, strict=True):
+            places = project(camera, roots)[0]
+            for limb, (first, length) in self._reaches.items():
+                away = np.linalg.norm(points - places[first], axis=1)
                 found[limb] += float(np.count_nonzero(away * mm <= length)) * (step * mm) ** 2
         return found
 

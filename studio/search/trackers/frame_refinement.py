@@ -325,9 +325,10 @@ def redrawn(
     return found if found is began_with else frame.refine(found), evaluations
 
 
-def all_redrawn(rng: np.random.Generator, found: Hypothesis, frame: SeenFrame) -> Hypothesis:
+def redraw_all(rng: np.random.Generator, found: Hypothesis, frame: SeenFrame) -> Hypothesis:
     """The hypothesis with each limb resampled, then both of a pair, however little they disagree: what a folded arm
-    leaves bare in one view of three may be too little to say so. Any lower loss counts, not only a much lower one.
+    leaves bare in one view of three may be too little to say so. A loss lower by 3 % is enough: no last frame says what
+    is likely.
     """
     names = list(found.off.shares())
     twins = name_twins(names)
@@ -355,7 +356,7 @@ def _doubts(off: Disagreement, chains: Sequence[str]) -> dict[str, float]:
     body disagrees with nothing, and what it leaves bare is nearest to a limb that it hangs from: all that is bare may
     be a chain's.
     """
-    shares, groups = off.doubts(), np.array(off.limbs)
+    shares, groups = off.shares_in_reach(), np.array(off.limbs)
     for limb in chains:
         own = groups == limb
         area = np.maximum(off.area.sum(axis=0), LEAST_AREA)[own].sum()

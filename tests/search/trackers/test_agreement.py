@@ -82,12 +82,12 @@ def test_what_lies_bare_beside_the_trunk_is_in_an_arms_reach(body: BodyModel) ->
     assert found.bare[:, own].sum() < 0.3 * whole
     assert found.within["right arm"] > 0.9 * whole
     assert "root" not in found.within
-    doubts, shares = found.doubts(), found.shares()
+    in_reach, shares = found.shares_in_reach(), found.shares()
     expected = (found.outside[:, own].sum() + found.within["right arm"]) / area
-    assert doubts["right arm"] == pytest.approx(expected, rel=1e-6)
-    assert doubts["right arm"] > 3.0 * shares["right arm"]
-    assert doubts["root"] == shares["root"]
+    assert in_reach["right arm"] == pytest.approx(expected, rel=1e-6)
+    assert in_reach["right arm"] > 3.0 * shares["right arm"]
+    assert in_reach["root"] == shares["root"]
     # Where the masks show much more than the body, they do not say which limb is off.
     smeared = dataclasses.replace(found, bare=0.021 * found.area.sum() / whole * found.bare)
-    assert smeared.doubts() == smeared.shares()
+    assert smeared.shares_in_reach() == smeared.shares()
     assert not without_bare(found).within
