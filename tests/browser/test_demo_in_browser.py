@@ -19,7 +19,7 @@ from studio_page import StudioPage
 from studio_server import StudioServer
 
 from studio.app.scene.particle_view import glowing
-from studio.app.scene.viewpoint import on_screen
+from studio.app.scene.viewpoint import WELL_FRAMED, on_screen
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import extremities
 from studio.runs.drawing.colour_tokens import colour_tokens
@@ -202,7 +202,7 @@ def test_annealing_is_seen_on_the_first_screen(browser: Browser, demo: StudioSer
             return 0.0
         return float(np.ptp(on_screen(ends, window.wire.eye, *window.wire.lens)[:, 1]))
 
-    until(page, lambda: 0.6 <= share_of_height() <= 0.9)
+    until(page, lambda: WELL_FRAMED[0] <= share_of_height() <= WELL_FRAMED[1])
     # Stand still, at the first layer.
     page.evaluate("async () => (await import('/assets/js/studio/layer_playback.js')).scrubTo(0)")
     until(page, lambda: window.wire.layers().keys() == {0})
@@ -224,7 +224,8 @@ def test_annealing_is_seen_on_the_first_screen(browser: Browser, demo: StudioSer
             assert spreads[1] >= 8.0, (name, spreads)
     limbs = [at for at, name in enumerate(names) if "hand" in name or "foot" in name]
     points = np.concatenate([first[:, limbs].reshape(-1, 2), last[:, limbs].reshape(-1, 2)])
-    assert page.evaluate(ALL_IN_SCENE, points.tolist())
+    # viser's word about drawing in software goes a moment after it was closed.
+    until(page, lambda: page.evaluate(ALL_IN_SCENE, points.tolist()))
     # What is drawn there has the layer's own shades, whatever lies before it.
     shades = glowing(colour_tokens(True), 0, len(clouds), np.linspace(0.0, 1.0, 30)).astype(float)
 

@@ -17,7 +17,7 @@ BROWSERS_OWN = 3.0, 3.0, 3.0, 0.0, 0.0, 0.0
 """Where viser's page stands until it is put somewhere, metres."""
 FILLED, WIDEST = 0.8, 0.86
 """Of the view's height that a framed body fills, and at most of its width."""
-WELL_FRAMED = 0.6, 0.9
+WELL_FRAMED = 0.72, 0.88
 """Shares of the height between which a body needs not be framed again."""
 CLOSEST = 0.3
 """Between the eye and the nearest point of a framed body, beside its size: from above that is its head."""
