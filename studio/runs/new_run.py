@@ -155,7 +155,7 @@ def prepare_run(
 
     Raises StudioError; then nothing was made.
     """
-    is_first = look_before_the_first_run(session, progress)
+    of_masks = look_before_the_first_run(session, progress)
     faults = accepted_faults(session, allow_inconsistent)
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
@@ -173,7 +173,7 @@ def prepare_run(
     first, last = session.checked_frames(_first(session, first, last, of), last, endless=ping_pong)
     if not 0 <= seed < 2**63:
         raise RunError(f"The seed {seed} cannot be used.", "Give a whole number of 0 or more.")
-    notes = (*([note] if note else []), *notes, *(f"{DESPITE}{fault}" for fault in faults))
+    notes = (*([note] if note else []), *notes, *(f"{DESPITE}{fault}" for fault in faults), *(of_masks or ()))
     model = chosen_model(session, tree, settings, behaviour)
     if model is not None and model.note:
         notes = (*notes, model.note)
@@ -185,7 +185,7 @@ def prepare_run(
         begin = _find_start(session, first, tree, path, seed, progress)
         start, source = within_limits(tree, begin.pose), begin.source
         notes = (*notes, *([begin.note] if begin.note else []))
-    if is_first and start is not None:
+    if of_masks is not None and start is not None:
         notes = (
             *notes,
             *contrast_notes(session, settings.evidence, KnownPoses(tree, {first: start}, source)),

@@ -3,7 +3,9 @@
 import dataclasses
 from pathlib import Path
 
+import cv2
 import msgspec
+import numpy as np
 import pytest
 from nudged_camera import make_nudged_session, true_cameras
 
@@ -37,3 +39,16 @@ def test_what_agrees_is_not_remembered_and_stops_nothing(tmp_path: Path) -> None
     look_before_the_first_run(session)
     assert known_faults(session) == ()
     assert accepted_faults(session, allow_inconsistent=False) == ()
+
+
+def test_masks_of_no_use_are_said_with_what_helps(tmp_path: Path) -> None:
+    """One camera's masks lie where the others see nothing; the run is not refused."""
+    session = imported(tmp_path / "good")
+    assert look_before_the_first_run(session) == ()
+    for path in (session.path / "masks" / "cam1").iterdir():
+        mask = np.zeros_like(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
+        mask[:40, :40] = 255
+        cv2.imwrite(str(path), mask)
+    (note,) = look_before_the_first_run(Session(session.path)) or ("",)
+    assert note.startswith("The views' masks agree by 0.00 only")
+    assert f"{session.name} --source best'" in note

@@ -50,6 +50,8 @@ from studio.sessions.session import Session
 FRAMES = 5
 USABLE = 0.9
 """Agreement from which masks are usable (issue 5)."""
+USELESS = 0.5
+"""Agreement below which masks show little of the subject, or much else."""
 MOST_FILLED = 0.5
 """Masks that cover more of the picture agree in every view and show nothing."""
 LEAST_BORDER = 0.25
@@ -265,35 +267,54 @@ def measure_masks(
     return quality
 
 
-def look_before_the_first_run(session: Session, progress: Progress = no_progress) -> bool:
-    """Whether nothing was tracked yet of imported footage. Its masks are measured then, unless that was done: exchanged
-    cameras, a mirrored video or a wrong unit refuse the run, instead of losing its frames. Masks that cannot be
-    compared say nothing.
+def look_before_the_first_run(session: Session, progress: Progress = no_progress) -> tuple[str, ...] | None:
+    """For the notes of the first run of imported footage: that its masks are of no use, and what may help; None where
+    something was tracked before. Its masks are measured, unless that was done: exchanged cameras, a mirrored video or a
+    wrong unit refuse the run, instead of losing its frames. Masks that cannot be compared say nothing.
     """
     if not session.manifest.layout or len(session.manifest.footage.cameras) < 2 or session.runs():
-        return False
+        return None
     measured = origin_of(session, MEASURED)
     if measured is not None and not changed_inputs(session, MEASURED, ("footage", "calibration")):
-        return True
+        return ()
     try:
-        doubts = _faults_by_silhouettes(session, progress)
+        quality = _measured_quickly(session, progress)
     except StudioError:
-        return True
-    if stops := blocking(doubts):
+        return ()
+    if stops := blocking(quality.doubts):
         remember(session, MEASURED, _in_doubt(stops[0]), False, tuple(map(str, stops)))
-    return True
+        return ()
+    least = min(float(np.nan_to_num(view.agreement)) for view in quality.views)
+    if least >= USELESS:
+        return ()
+    return (
+        f"The views' masks agree by {least:.2f} only ({USABLE:g} is usual): hardly anything can be tracked with them."
+        f" Set another background first: 'studio background {session.name} --source best', or \"Best of all\" in step"
+        " Background, tries every source.",
+    )
 
 
-def _faults_by_silhouettes(session: Session, progress: Progress) -> tuple[Finding, ...]:
-    """What the silhouettes say against the calibration: the part of `mask_quality` that takes little time."""
-    cameras = session.cameras()
+def _measured_quickly(session: Session, progress: Progress) -> MaskQuality:
+    """The part of `mask_quality` that takes little time: agreement with a rough hull, and what the silhouettes say
+    against the calibration.
+    """
+    cameras, scale = session.cameras(), scale_of(session.body())
     check_views(cameras)
+    small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
+    lenses = {camera.name: camera for camera in small}
     with masks_of(session, session_settings(session).evidence) as maker:
-        people = {frame: PackedMasks() for frame in spread_frames(maker.footage.frame_count, FRAMES)}
+        frames = spread_frames(maker.footage.frame_count, FRAMES)
+        masks: dict[int, list[Bytes]] = {frame: [] for frame in frames}
+        people = {frame: PackedMasks() for frame in frames}
         total = len(cameras) * len(people)
-        for camera, frame, view in _each_view(maker, cameras, tuple(people), total, progress):
+        for camera, frame, view in _each_view(maker, cameras, frames, total, progress):
+            masks[frame].append(reduced(view.mask, lenses[camera.name]))
             people[frame].put(camera.name, person_alone(view.mask))
-    return silhouette_faults(cameras, people, height_of(session), scale_of(session.body()))
+    counted = [count_frame(masks[frame], small, False, ROUGH, scale) for frame in frames]
+    faults = silhouette_faults(cameras, people, height_of(session), scale)
+    return dataclasses.replace(
+        summed(frames, tuple(camera.name for camera in cameras), counted), doubts=faults
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
