@@ -8,7 +8,7 @@ them stored (`kernel_cache`), or waits for the one in progress.
 import contextlib
 import dataclasses
 import threading
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -29,13 +29,14 @@ from studio.runs.search_space import search_space
 from studio.search.likelihood.outline_kernels import LANES, ROWS
 from studio.search.likelihood.outlines import OutlineProjector
 from studio.search.likelihood.silhouette_areas import HALF, silhouettes_of
-from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.agreement import Agreement, limb_names
 from studio.search.trackers.agreement_kernels import FIELDS, count_cells, view_counts
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_loop import search_frame
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
 from studio.search.trackers.hidden_areas import cell_size, counts_of
-from studio.search.trackers.limbs_elsewhere import changes_by_camera
+from studio.search.trackers.limb_colours import FEWEST, LimbColours
+from studio.search.trackers.limbs_elsewhere import Change, changes_by_camera
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.settings import AnnealedSettings
 from studio.search.trackers.tracker import Estimate, FrameResult, start_of
@@ -67,6 +68,17 @@ def compile_for(_inbox: Connection, _outbox: Connection, session_folder: Path, r
     silhouettes = partial(silhouettes_by_camera, evidence)
     changes = partial(changes_by_camera, evidence)
     FrameRefiner(body, cameras, 0).refined(result, silhouettes, _Alike(), settings, changes)
+    _compile_colours(body, cameras, pose, tuple(changes().values()))
+
+
+def _compile_colours(
+    body: BodyModel, cameras: tuple[Camera, ...], pose: Array, changed: Sequence[Change]
+) -> None:
+    """What compares colours, called as if those of all limbs were known."""
+    colours = LimbColours(body, cameras)
+    views = colours.views(pose, changed)
+    for name, counts in colours.learnt(pose, views, {}, {}).items():
+        colours.gains(pose[None], limb_names(body)[0], views, {name: counts + FEWEST})
 
 
 def _compile_without_outlines(body: BodyModel, cameras: tuple[Camera, ...], pose: Array) -> None:

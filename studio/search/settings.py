@@ -27,6 +27,7 @@ RENAMED: dict[str, tuple[str, dict[object, Value]]] = {"limits": ("constraints",
 BEFORE: dict[str, Value] = {
     "refine_frames": False,
     "above_floor": False,
+    "limb_colours": False,
     "mask_shadow_window": 1,
     "mask_shadow_floor": False,
     "mask_shadow_alike": 0.0,

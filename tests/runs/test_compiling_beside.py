@@ -21,12 +21,15 @@ from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 from studio.operations.jobs.open_run import OpenRun
 from studio.runs import compiling_beside
-from studio.search.trackers import agreement_kernels, refinement_kernels
+from studio.search.trackers import agreement_kernels, limb_colour_kernels, limb_places, refinement_kernels
 from studio.search.likelihood import area_kernels
 from studio.evidence import distance_maps
 
 def forms():
-    modules = agreement_kernels, refinement_kernels, area_kernels, distance_maps
+    modules = (
+        *(agreement_kernels, limb_colour_kernels, limb_places, refinement_kernels),
+        *(area_kernels, distance_maps),
+    )
     kernels = {one for module in modules for one in vars(module).values() if isinstance(one, Dispatcher)}
     kernels -= {area_kernels.three_terms}  # of the search itself
     return {(kernel.py_func.__name__, str(form)) for kernel in kernels for form in kernel.overloads}

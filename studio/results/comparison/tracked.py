@@ -174,7 +174,8 @@ def track_seeds(
         raise NotFoundError(f"There is no frame {frames[-1]}. '{trial.footage}' has 0 to {count - 1}.", "")
 
     def evidence(frame: int, name: str = trial.weighting) -> FrameEvidence:
-        kind, pictures = WEIGHTINGS[name].edge_kind, WEIGHTINGS[name].reads_pictures
+        kind = WEIGHTINGS[name].edge_kind
+        pictures = WEIGHTINGS[name].reads_pictures or settings.refinement.refine_frames
         return spoilt.evidence(cache.evidence(session, cameras, frame, settings.evidence, kind, pictures))
 
     start = _start_pose(session, body, trial.first)

@@ -7,7 +7,8 @@ right. The best are refined, and one is taken where the silhouettes agree with i
 show a limb elsewhere then (`limbs_elsewhere`), that limb is resampled on silhouettes that have what changed there,
 shadows too, by the same rule, and the pose is taken if fewer limbs are elsewhere with it. Tried without gain: draws
 that are bent towards those places by inverse kinematics. Areas where something stands in front of the body are left out
-(`hidden_areas`).
+(`hidden_areas`). A limb before the body is in no silhouette: the colours that were learnt of it say where it is
+(`limb_colours`).
 """
 
 import dataclasses
@@ -26,10 +27,11 @@ from studio.evidence.volume.alignment import root_parameters, with_root_at
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
-from studio.search.trackers.agreement import LEAST_AREA, Agreement, Disagreement
+from studio.search.trackers.agreement import GRID_MM, LEAST_AREA, Agreement, Disagreement
 from studio.search.trackers.hidden_areas import learnt, without_hidden
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
-from studio.search.trackers.limbs_elsewhere import Change, LimbsElsewhere, lost_of
+from studio.search.trackers.limb_colours import Gain, LimbColours
+from studio.search.trackers.limbs_elsewhere import SURELY_SHOWN, Change, Elsewhere, LimbsElsewhere, lost_of
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import FLOOR_HELP, Distances, RefinementSettings, Refiner
 from studio.search.trackers.tracker import (
@@ -64,6 +66,10 @@ MOST_TOGETHER, KEPT_ALONG, DRAWS_ALONG = 7, 6, 160
 are kept from joint to joint, and how many are drawn from each."""
 FEWEST_ANGLES, ALL_REFINED = 3, 8
 """Where every limb is drawn, however little it disagrees: the least angles of one, and how many poses are refined."""
+LEAST_GAIN, NOT_WORSE = 40.0, 1.03
+"""By how much a limb's colours (`limb_colours`) must gain less than expected if it is resampled by them, and how much
+more they must then; and how often the loss it may have: silhouettes do not tell one place before the body from
+another."""
 REDRAWN = 0x11A6
 
 
@@ -89,6 +95,10 @@ class FrameRefinementSettings:
     redraw_limbs: bool = next_frame_knob(
         True, label="resample lost limbs",
         help="Where the silhouettes show that a limb is off, sample it over its whole range and refine the best.",
+    )  # fmt: skip
+    limb_colours: bool = next_frame_knob(
+        True, label="colours of limbs",
+        help="Learn the colours of limbs, and resample one before the body where they say that it is not there.",
     )  # fmt: skip
     above_floor: bool = next_frame_knob(True, label="stays above the floor", help=FLOOR_HELP)
     refined_spread: float = next_frame_knob(
@@ -153,7 +163,7 @@ class FrameRefiner:
         )
         if not any(len(view.border) for view in seen.values()):
             return result
-        refiner, redrawing, agreement, certainty_of, witness = self._prepared(
+        refiner, redrawing, agreement, certainty_of, witness, colours = self._prepared(
             tuple(seen),
             descent(settings, settings.refine_frame_steps),
             descent(settings, max(settings.refine_frame_steps, REDRAWN_STEPS)),
@@ -185,13 +195,27 @@ class FrameRefiner:
             then = elsewhere if found is began_with else witness.of(found.pose, changed, memory)
             if len(lost_of(then)) < len(named):
                 pose, off, masks, silhouettes, elsewhere = found.pose, found.off, shown, without, then
+        views = colours.views(pose, changed) if changed and settings.limb_colours else []
+        if views and settings.redraw_limbs:
+            rng = keyed_generator(self._seed, result.frame, 0, 2, REDRAWN)
+            seen_frame = SeenFrame(redrawing, agreement, silhouettes)
+            began_with = seen_frame.hypothesis(pose)
+            gains_of = functools.partial(colours.gains, views=views, memory=memory)
+            found, more = recoloured(rng, began_with, seen_frame, elsewhere, gains_of)
+            evaluations += more
+            if found is not began_with:
+                pose, off, elsewhere = found.pose, found.off, witness.of(found.pose, changed, memory)
         weight = float(problem.log_likelihood(pose[None])[0])
         estimate = dataclasses.replace(result.estimate, pose=pose, searched=start, log_weight=weight)
         carried = _carried(result, pose, settings.next_frame_from, refiner)
         if matrix is None or pose is not ended.pose:
             matrix = refiner.loss(pose, silhouettes)[2]
         certainty = certainty_of.of(pose, matrix, memory)
-        memory = {**learnt(memory, off, agreement.cameras, masks), **certainty.moved}
+        memory = {
+            **learnt(memory, off, agreement.cameras, masks),
+            **certainty.moved,
+            **colours.learnt(pose, views, elsewhere, memory),
+        }
         return dataclasses.replace(
             result,
             estimate=estimate,
@@ -212,6 +236,7 @@ class FrameRefiner:
             Agreement(self._body, cameras),
             CertaintyOfLimbs(ending),
             LimbsElsewhere(self._body, cameras),
+            LimbColours(self._body, cameras),
         )
 
 
@@ -223,6 +248,7 @@ class _Prepared(NamedTuple):
     agreement: Agreement
     certainty_of: CertaintyOfLimbs
     witness: LimbsElsewhere
+    colours: LimbColours
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -323,6 +349,40 @@ def redrawn(
         found, more = _both_redrawn(rng, found, frame, limb)
         evaluations += more
     return found if found is began_with else frame.refine(found), evaluations
+
+
+def recoloured(
+    rng: np.random.Generator,
+    found: Hypothesis,
+    frame: SeenFrame,
+    elsewhere: Mapping[str, Elsewhere],
+    gains_of: Callable[[Array, str], Gain],
+) -> tuple[Hypothesis, int]:
+    """The hypothesis with limbs that hardly show by themselves resampled, where the colours before which
+    they lie are not theirs, and the number of poses compared. gains_of : of poses (N, D) and a limb.
+    """
+    evaluations, chains = 0, _chains(frame.refiner)
+    for limb, one in elsewhere.items():
+        own = bent_by(frame.refiner, limb)
+        if one.shown >= SURELY_SHOWN or limb in chains or len(own) < FEWEST_ANGLES:
+            continue
+        now = gains_of(found.pose[None], limb)
+        if now.gain[0] > now.expected[0] - LEAST_GAIN:
+            continue
+        drawn = _drawn(rng, frame.refiner, found.pose[None], own)
+        gains, most = gains_of(drawn, limb).gain, now.gain[0] + LEAST_GAIN
+        if gains.max() < most:
+            continue
+        evaluations += len(drawn)
+        off, allowed = frame.agreement.of_places(drawn, frame.silhouettes), NOT_WORSE * found.loss
+        for start in _best_apart(drawn, off - GRID_MM**2 * gains, own, REFINED_DRAWS):
+            pose = frame.refiner.refine(start, frame.silhouettes).pose
+            if frame.refiner.loss_with_pull(pose, frame.silhouettes) > allowed:
+                continue
+            gain = gains_of(pose[None], limb).gain[0]
+            if gain >= most:
+                found, most = frame.hypothesis(pose), gain
+    return found, evaluations
 
 
 def redraw_all(rng: np.random.Generator, found: Hypothesis, frame: SeenFrame) -> Hypothesis:

@@ -97,11 +97,12 @@ class Elsewhere:
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
     """What changed in a view. kinds : (h, w) SAME, CHANGED or OPEN, of cells. size : pixels along a cell's
-    side.
+    side. picture : (H, W, 3) BGR.
     """
 
     kinds: Bytes
     size: int
+    picture: Bytes
 
 
 _known: WeakKeyDictionary[FrameEvidence, Mapping[str, Change]] = WeakKeyDictionary()
@@ -123,7 +124,7 @@ def change_of(view: ViewEvidence) -> Change:
     cells_of(
         view.mask, shadow, unknown, size, FILLED, kinds, view.shadow is not None, view.unknown is not None
     )
-    return Change(kinds, size)
+    return Change(kinds, size, view.picture)
 
 
 class LimbsElsewhere:
