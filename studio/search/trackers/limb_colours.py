@@ -10,7 +10,8 @@ lies and in the middle of their breadth: a limb that is lost before the trunk li
 the trunk's colours as its own. Twins share theirs. Counts by colour fade from frame to frame; they are part of the
 frame's state, so that a resumed run, or a frame that is searched again, has them.
 
-Chosen on the two clips of others with a camera left out, and on four clips of the choosing half.
+Chosen on the two clips of others with a camera left out, and on four clips of the choosing half. A gain far below what
+is expected does not name a lost limb: arms beside the head have it, too.
 """
 
 from collections.abc import Mapping, Sequence
