@@ -357,8 +357,8 @@ def recoloured(
     elsewhere: Mapping[str, Elsewhere],
     gains_of: Callable[[Array, str], Gain],
 ) -> tuple[Hypothesis, int]:
-    """The hypothesis with limbs that hardly show by themselves resampled, where the colours before which
-    they lie are not theirs, and the number of poses compared. gains_of : of poses (N, D) and a limb.
+    """The hypothesis with limbs that hardly show by themselves resampled where the picture has not their colours, and
+    the number of poses compared. gains_of : of poses (N, D) and a limb.
     """
     evaluations, chains = 0, _chains(frame.refiner)
     for limb, one in elsewhere.items():

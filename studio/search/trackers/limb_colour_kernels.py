@@ -29,14 +29,16 @@ def place_on(x, y, part, breadth):
 def box_on(part, step, rows, columns):
     """First and last row, and column, of the grid's points that may lie on a part; none where it is not seen."""
     wide = max(part[6], part[7])
-    finite = np.isfinite(part[0]) and np.isfinite(part[1]) and np.isfinite(part[2]) and np.isfinite(part[3])
-    if not (finite and np.isfinite(wide)):
+    left, right = min(part[0], part[2]) - wide, max(part[0], part[2]) + wide
+    top, bottom = min(part[1], part[3]) - wide, max(part[1], part[3]) + wide
+    # NaN, where a limb is not seen, is in no order.
+    if not (right >= 0.0 and bottom >= 0.0 and left <= columns * step and top <= rows * step):
         return 0, -1, 0, -1
     return (
-        max(0, int(np.ceil((min(part[1], part[3]) - wide) / step))),
-        min(rows - 1, int(np.floor((max(part[1], part[3]) + wide) / step))),
-        max(0, int(np.ceil((min(part[0], part[2]) - wide) / step))),
-        min(columns - 1, int(np.floor((max(part[0], part[2]) + wide) / step))),
+        int(np.ceil(max(0.0, top) / step)),
+        int(np.floor(min(float(rows - 1), bottom / step))),
+        int(np.ceil(max(0.0, left) / step)),
+        int(np.floor(min(float(columns - 1), right / step))),
     )
 
 
