@@ -32,9 +32,9 @@ def ring_of_cameras(
     return tuple(cameras)
 
 
-def drawn_mask(body: BodyModel, pose: Array, camera: Camera) -> NDArray[np.uint8]:
-    """(H, W) 0 and 255: each limb the convex hull of two discs that stand across its axis."""
-    mask = np.zeros((camera.height, camera.width), np.uint8)
+def drawn_outlines(body: BodyModel, pose: Array, camera: Camera) -> list[NDArray[np.int32]]:
+    """Of each drawn limb the convex hull of two discs that stand across its axis, pixels."""
+    found = []
     for limb, frame in zip(body.drawn, limb_frames(body, pose)[0], strict=True):
         across = np.stack([limb.scale_x * np.cos(RING), limb.scale_y * np.sin(RING), 0.0 * RING], axis=1)
         ends = [
@@ -42,8 +42,15 @@ def drawn_mask(body: BodyModel, pose: Array, camera: Camera) -> NDArray[np.uint8
             for radius, along in ((limb.radius_start, 0.0), (limb.radius_end, limb.length))
         ]
         points = np.concatenate(ends) @ frame[:, :3].T + frame[:, 3]
-        pixels = np.round(project(camera, points)[0]).astype(np.int32)
-        cv2.fillConvexPoly(mask, cv2.convexHull(pixels), 255)
+        found.append(cv2.convexHull(np.round(project(camera, points)[0]).astype(np.int32)))
+    return found
+
+
+def drawn_mask(body: BodyModel, pose: Array, camera: Camera) -> NDArray[np.uint8]:
+    """(H, W) 0 and 255, of all limbs' outlines."""
+    mask = np.zeros((camera.height, camera.width), np.uint8)
+    for outline in drawn_outlines(body, pose, camera):
+        cv2.fillConvexPoly(mask, outline, 255)
     return mask
 
 

@@ -198,7 +198,7 @@ class FrameRefiner:
         if views and settings.redraw_limbs:
             rng = keyed_generator(self._seed, result.frame, 0, 2, REDRAWN)
             seen_frame = SeenFrame(redrawing, agreement, silhouettes)
-            began_with = seen_frame.hypothesis(pose)
+            began_with = Hypothesis(pose, redrawing.loss_with_pull(pose, silhouettes), off)
             gains_of = functools.partial(colours.gains, views=views, memory=memory)
             found, more = recoloured(rng, began_with, seen_frame, elsewhere, gains_of)
             evaluations += more

@@ -6,16 +6,14 @@ from functools import partial
 import cv2
 import numpy as np
 import pytest
-from drawn_people import RING, drawn_mask, ring_of_cameras
+from drawn_people import drawn_mask, drawn_outlines, ring_of_cameras
 from moving_bodies import standing
 
 from studio.body.catalogue import load_body
-from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
+from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array, Bytes
-from studio.foundations.geometry.camera import Camera
-from studio.foundations.geometry.projection import project
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
 from studio.search.trackers.limb_colours import COLOURS, COUNT, LimbColours, code_of
@@ -37,23 +35,16 @@ def seen_in(pose: Array, *, skin: tuple[int, int, int] = SKIN, frame: int = 0) -
     for camera in CAMERAS:
         mask = drawn_mask(BODY, pose, camera)
         picture = np.full((camera.height, camera.width, 3), 90, np.uint8)
+        outlines = drawn_outlines(BODY, pose, camera)
         away = limb_ends(BODY, pose[None])[0].mean(axis=1) @ camera.rotation[2]
         for limb in np.argsort(-away):
             name = BODY.drawn[int(limb)].name
             bare = "lower arm" in name or "forearm" in name or "hand" in name
-            cv2.fillConvexPoly(picture, _hull(pose, int(limb), camera), skin if bare else SHIRT)
+            cv2.fillConvexPoly(picture, outlines[limb], skin if bare else SHIRT)
         noisy = picture + rng.normal(0.0, 4.0, picture.shape)
         nothing: Bytes = np.zeros_like(mask)
         views.append(ViewEvidence(camera.name, np.clip(noisy, 0, 255).astype(np.uint8), mask, nothing))
     return FrameEvidence(frame, tuple(views))
-
-
-def _hull(pose: Array, number: int, camera: Camera) -> np.ndarray:
-    limb, frame = BODY.drawn[number], limb_frames(BODY, pose)[0, number]
-    across = np.stack([limb.scale_x * np.cos(RING), limb.scale_y * np.sin(RING), 0.0 * RING], axis=1)
-    ends = ((limb.radius_start, 0.0), (limb.radius_end, limb.length))
-    points = np.concatenate([radius * across + [0.0, 0.0, along] for radius, along in ends])
-    return cv2.convexHull(np.rint(project(camera, points @ frame[:, :3].T + frame[:, 3])[0]).astype(np.int32))
 
 
 def learnt(frames: int = 8, **seen: tuple[int, int, int]) -> dict[str, Array]:
