@@ -78,7 +78,7 @@ def _compile_colours(
     colours = LimbColours(body, cameras)
     views = colours.views(pose, changed)
     for name, counts in colours.learnt(pose, views, {}, {}).items():
-        colours.gains(pose[None], limb_names(body)[0], views, {name: counts + FEWEST})
+        colours.gains(pose[None], limb_names(body)[0], views, colours.known({name: counts + FEWEST}))
 
 
 def _compile_without_outlines(body: BodyModel, cameras: tuple[Camera, ...], pose: Array) -> None:

@@ -199,7 +199,7 @@ class FrameRefiner:
             rng = keyed_generator(self._seed, result.frame, 0, 2, REDRAWN)
             seen_frame = SeenFrame(redrawing, agreement, silhouettes)
             began_with = Hypothesis(pose, redrawing.loss_with_pull(pose, silhouettes), off)
-            gains_of = functools.partial(colours.gains, views=views, memory=memory)
+            gains_of = functools.partial(colours.gains, views=views, known=colours.known(memory))
             found, more = recoloured(rng, began_with, seen_frame, elsewhere, gains_of)
             evaluations += more
             if found is not began_with:

@@ -76,6 +76,17 @@ class Gain(NamedTuple):
     expected: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownColours:
+    """What was learnt. kinds : (L,) number of each drawn limb's colours, NOTHING where too few were seen. logs, usual :
+    as of `_logarithms`.
+    """
+
+    kinds: Codes
+    logs: Array
+    usual: Array
+
+
 class LimbColours:
     """Compares limbs of a body with their colours in some cameras; immutable."""
 
@@ -97,24 +108,23 @@ class LimbColours:
         sizes = mm_at(self._body, self._cameras, pose)
         return [_coloured(view, max(1, round(GRID_MM / mm))) for view, mm in zip(changed, sizes, strict=True)]
 
-    def gains(
-        self, poses: Array, limb: str, views: Sequence[ColouredView], memory: Mapping[str, Array]
-    ) -> Gain:
-        """The gain of a limb in poses (N, D) that differ in it alone; 0 where its colours are not known. memory : at
-        the frame's start.
-        """
-        found = Gain(np.zeros(len(poses)), np.zeros(len(poses)))
+    def known(self, memory: Mapping[str, Array]) -> KnownColours | None:
+        """The colours that are known of limbs; None before any were learnt. memory : at the frame's start."""
         counts = memory.get(COLOURS)
-        if counts is None or not views:
+        if counts is None:
+            return None
+        enough = counts.sum(axis=1) >= FEWEST
+        return KnownColours(np.where(enough[self._kinds], self._kinds, NOTHING), *_logarithms(counts))
+
+    def gains(
+        self, poses: Array, limb: str, views: Sequence[ColouredView], known: KnownColours | None
+    ) -> Gain:
+        """The gain of a limb in poses (N, D) that differ in it alone; 0 where its colours are not known."""
+        found, own = Gain(np.zeros(len(poses)), np.zeros(len(poses))), self._owners == self._limbs.index(limb)
+        if known is None or not views or not (known.kinds[own] != NOTHING).any():
             return found
-        known = counts.sum(axis=1) >= FEWEST
-        own, kinds = (
-            self._owners == self._limbs.index(limb),
-            np.where(known[self._kinds], self._kinds, NOTHING),
-        )
-        if not (kinds[own] != NOTHING).any():
-            return found
-        (logs, usual), ends = _logarithms(counts), limb_ends(self._body, poses)
+        kinds, logs, usual = known.kinds, known.logs, known.usual
+        ends = limb_ends(self._body, poses)
         for camera, view in zip(self._cameras, views, strict=True):
             front, depths, _ = _front_of(self._parts(camera, ends[:1])[0], self._owners, own, view, 1.0)
             moving = self._parts(camera, ends[:, own], own)

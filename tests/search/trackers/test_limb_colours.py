@@ -59,7 +59,7 @@ def learnt(frames: int = 8, **seen: tuple[int, int, int]) -> dict[str, Array]:
 def gain_of(pose: Array, evidence: FrameEvidence, memory: dict[str, Array]) -> tuple[float, float]:
     colours = LimbColours(BODY, CAMERAS)
     changed = tuple(changes_by_camera(evidence).values())
-    found = colours.gains(pose[None], "left arm", colours.views(pose, changed), memory)
+    found = colours.gains(pose[None], "left arm", colours.views(pose, changed), colours.known(memory))
     return float(found.gain[0]), float(found.expected[0])
 
 
