@@ -1,6 +1,7 @@
 """How lost limbs are drawn again, step by step; what says that a frame is lost; and edges of a smoothed track."""
 
 import dataclasses
+import functools
 import math
 from types import SimpleNamespace
 
@@ -17,6 +18,8 @@ from studio.search.likelihood.catalogue import LossLimit
 from studio.search.trackers import frame_refinement as frames
 from studio.search.trackers.agreement import Disagreement
 from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame
+from studio.search.trackers.limb_colours import Gain
+from studio.search.trackers.limbs_elsewhere import Elsewhere
 from studio.search.trackers.loss_detection import Onlooker, Sight, WeightWatch, is_blank, shown_by
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.smoothing import SmoothingSettings, _noise, _stretches, _trusted
@@ -209,6 +212,53 @@ def test_sound_limbs_are_not_drawn_and_the_last_pose_is_tried_first(
     frame = Told(body, refiner)
     assert frames.redrawn(np.random.default_rng(0), doubtful, frame) == (doubtful, 2048)
     assert len(frame.asked) == 2
+
+
+def recoloured_with(
+    refiner: Refiner, *, shown: float, now: tuple[float, float], then: tuple[float, float], loss: float
+) -> tuple[bool, int]:
+    """Whether a drawn pose is taken of an arm that shows so much of itself and has such a gain and expectation, where
+    all others have such ones and such a share of its loss; and how many were drawn.
+    """
+    pose = np.zeros(len(refiner.body.parameters))
+
+    def gains_of(poses: Array, limb: str) -> Gain:
+        moved = (poses != pose).any(axis=1)
+        return Gain(*(np.where(moved, after, before) for before, after in zip(now, then, strict=True)))
+
+    frame = SimpleNamespace(
+        refiner=SimpleNamespace(
+            body=refiner.body, bounded=refiner.bounded, lower=refiner.lower, upper=refiner.upper,
+            refine=lambda start, silhouettes: SimpleNamespace(pose=start),
+            loss_with_pull=lambda one, silhouettes: 10.0 * loss,
+        ),
+        agreement=SimpleNamespace(of_places=lambda poses, silhouettes: np.zeros(len(poses))),
+        silhouettes=(),
+        hypothesis=lambda one: Hypothesis(one, 10.0 * loss, None),
+    )  # fmt: skip
+    arms, began_with = {"left arm": Elsewhere(0.0, 0.97, shown)}, Hypothesis(pose, 10.0, None)
+    found, drawn = frames.recoloured(np.random.default_rng(0), began_with, frame, arms, gains_of)
+    return found is not began_with, drawn
+
+
+def test_a_limb_that_shows_by_itself_is_drawn_elsewhere_only_where_colours_and_silhouettes_plainly_agree(
+    refiner: Refiner,
+) -> None:
+    shows = functools.partial(recoloured_with, refiner, shown=0.5)
+    denied, confirmed = (37.0, 150.0), (60.0, 150.0)
+    assert shows(now=denied, then=confirmed, loss=0.96) == (False, 0)  # 23 more are not enough
+    denied = (-90.0, 150.0)
+    assert shows(now=denied, then=confirmed, loss=0.96) == (True, 4096)
+    assert shows(now=denied, then=confirmed, loss=0.98) == (False, 4096)
+    assert shows(now=denied, then=(59.0, 150.0), loss=0.96) == (False, 4096)
+    assert shows(now=(38.0, 150.0), then=(150.0, 150.0), loss=0.5) == (False, 0)
+    assert shows(now=(-90.0, 79.0), then=confirmed, loss=0.5) == (False, 0)
+    # One that hardly shows is drawn where colours gain less than expected, and silhouettes need not agree better.
+    hardly = functools.partial(recoloured_with, refiner, shown=0.38)
+    assert hardly(now=(38.0, 79.0), then=(78.0, 150.0), loss=1.0) == (True, 1024)
+    assert hardly(now=(38.0, 79.0), then=(77.0, 150.0), loss=1.0) == (False, 0)
+    assert hardly(now=(40.0, 79.0), then=confirmed, loss=0.5) == (False, 0)
+    assert hardly(now=denied, then=confirmed, loss=1.01) == (False, 1024)
 
 
 @pytest.fixture(scope="module")
