@@ -7,7 +7,7 @@ from pathlib import Path
 
 from studio.body.motion_files.trc import MarkerMotion, read_trc
 from studio.foundations.arrays import Array, Indices
-from studio.foundations.errors import NotFoundError
+from studio.foundations.errors import NotFoundError, StudioError
 from studio.results.evaluation.errors import Evaluation, evaluate
 from studio.runs.tracks import RAW, read_track, track_stamp
 from studio.sessions.session import Session
@@ -16,7 +16,7 @@ from studio.sessions.stored_run import StoredRun
 KEPT = 64
 
 _lock = threading.Lock()
-_evaluations: OrderedDict[tuple[Path, int, int, str, int], Evaluation] = OrderedDict()
+_evaluations: OrderedDict[tuple[Path, int, Path, int, str, int], Evaluation] = OrderedDict()
 
 
 def evaluation_of(
@@ -36,7 +36,7 @@ def evaluation_of(
     frames, poses = _poses_of(run, track, blobs)
     if not len(frames):
         return None
-    key = (run.folder, len(frames), stamp, track, track_stamp(run, track))
+    key = (run.folder, len(frames), path, stamp, track, track_stamp(run, track))
     # A run's page asks for it three times at once: one measures, the others wait for that.
     with _lock:
         if key in _evaluations:
@@ -46,6 +46,21 @@ def evaluation_of(
         if len(_evaluations) > KEPT:
             _evaluations.popitem(last=False)
     return measured
+
+
+def measure_or_say_why(
+    session: Session, run: StoredRun, track: str = RAW, *, blobs: bool = True
+) -> tuple[Evaluation | None, str]:
+    """The errors as of `evaluation_of`, None where there are none; and why the truth cannot be used, "" if it can.
+
+    Raises NotFoundError for an unknown track.
+    """
+    try:
+        return evaluation_of(session, run, track, blobs=blobs), ""
+    except NotFoundError:
+        raise
+    except StudioError as error:
+        return None, str(error)
 
 
 def measured(session: Session, run: StoredRun) -> Evaluation:

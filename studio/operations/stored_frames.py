@@ -11,13 +11,11 @@ from pydantic import Field
 
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Array
-from studio.foundations.errors import NotFoundError, StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import Value
 from studio.operations.overview import ParameterView, describe, parameter_views
-from studio.operations.run_errors import evaluation_of
+from studio.operations.run_errors import measure_or_say_why
 from studio.operations.run_settings import SettingsChange, changes_of, history_of
-from studio.results.evaluation.errors import Evaluation
 from studio.results.inspection.cloud_outlines import CloudOutline, outline_of
 from studio.results.inspection.reading import InspectedFrame, InspectedRun
 from studio.results.inspection.verdict import limbs_off, verdict_on, verdicts
@@ -231,7 +229,7 @@ def frames_summary(
     with run.results() as results:
         damaged, timeline = results.damaged(blobs=check), results.timeline(blobs=check)
         partial, checked = results.partial(), check or results.is_checked()
-    measured, problem = _errors_of(session, run, track, check=check)
+    measured, problem = measure_or_say_why(session, run, track, blobs=check)
     errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True)) if measured else {}
     lost = dict(zip(measured.frames, measured.lost_by_frame, strict=True)) if measured else {}
     with run.results() as results:
@@ -425,13 +423,3 @@ def effective_share(log_weights: Array, beta: float) -> float:
 
 def _quantiles(values: Array) -> list[float]:
     return np.quantile(values, QUANTILES).tolist() if values.size else []
-
-
-def _errors_of(session: Session, run: StoredRun, track: str, *, check: bool) -> tuple[Evaluation | None, str]:
-    """The track's errors, None without a truth; and why the truth cannot be used, if so."""
-    try:
-        return evaluation_of(session, run, track, blobs=check), ""
-    except NotFoundError:
-        raise
-    except StudioError as error:
-        return None, str(error)

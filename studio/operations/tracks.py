@@ -11,7 +11,7 @@ from studio.operations.exports import keep_file, kept_file
 from studio.operations.opening import session_of
 from studio.operations.person import landmarks
 from studio.operations.results import evaluate
-from studio.operations.run_errors import evaluation_of
+from studio.operations.run_errors import measure_or_say_why
 from studio.runs.checking import RunCheck, kept_check
 from studio.runs.jumps import Jump
 from studio.runs.refining import REFINED, check_making, jitter
@@ -104,17 +104,24 @@ class CheckAnswer:
     note: str = ""
 
 
-def track_lines(session: Session, run: StoredRun) -> tuple[TrackLine, ...]:
-    """The run's tracks with how much they jitter and, where there is a truth, how far off they are."""
-    return tuple(_line(session, run, name) for name in track_names(run))
+def track_lines(session: Session, run: StoredRun) -> tuple[tuple[TrackLine, ...], str]:
+    """The run's tracks with how much they jitter and, where there is a truth, how far off they are; and why the truth
+    cannot be used, "" if it can.
+    """
+    lines, problems = list[TrackLine](), list[str]()
+    for name in track_names(run):
+        line, problem = _line(session, run, name)
+        lines.append(line)
+        problems += [problem] if problem else []
+    return tuple(lines), problems[0] if problems else ""
 
 
-def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
+def _line(session: Session, run: StoredRun, name: str) -> tuple[TrackLine, str]:
     track = read_track(run, name, blobs=False)
     if not len(track.frames):
-        return TrackLine(name, 0, dict(track.made_by))
-    errors = evaluation_of(session, run, name, blobs=False)
-    return TrackLine(
+        return TrackLine(name, 0, dict(track.made_by)), ""
+    errors, problem = measure_or_say_why(session, run, name, blobs=False)
+    line = TrackLine(
         name=name,
         frames=len(track.frames),
         made_by=dict(track.made_by),
@@ -124,6 +131,7 @@ def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
         mean_direction_deg=errors and errors.mean_direction_deg,
         worst_mm=errors and errors.worst_mm,
     )
+    return line, problem
 
 
 def shown_track(run: StoredRun, track: str) -> tuple[str, int]:

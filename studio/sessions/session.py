@@ -6,8 +6,9 @@ Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `b
 `subject.toml`, `start_pose.csv`, `truth.trc`), `runs/<run>/`.
 """
 
+import itertools
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import av
@@ -17,6 +18,7 @@ import numpy as np
 from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
+from studio.body.motion_files.trc import read_marker_names
 from studio.body.subject import Subject, fit_subject, read_subject
 from studio.footage.capture.calibration_files import calibration_text, read_calibration
 from studio.footage.capture.footage import Footage, open_footage
@@ -76,6 +78,12 @@ OTHERS_START_POSE = "start_pose-of-{}.csv"
 THUMBNAIL_NAME, BODIES_NAME, RUNS_NAME = "thumbnail.jpg", "bodies", "runs"
 BESIDE = "beside"
 """Folder of what is known of other subjects in view, a folder each: `subject.toml`, `start_pose.csv`, `truth.trc`."""
+
+
+@lru_cache(maxsize=64)
+def _marker_names(path: Path, _stamp: int) -> frozenset[str]:
+    """The markers that a TRC file names, read again when the file's time of change differs."""
+    return frozenset(read_marker_names(path))
 
 
 class Session:
@@ -241,9 +249,21 @@ class Session:
 
     @property
     def truth_path(self) -> Path | None:
-        """The TRC file with the true motion, None without one."""
+        """The TRC file with the true motion, None without one. Of several it is the first that names a marker of the
+        session's body, else the first.
+        """
         files = sorted((self.path / "truth").glob("*.trc"))
-        return files[0] if files else None
+        fitting = (path for path in files if self._has_markers_of(path)) if len(files) > 1 else ()
+        return next(itertools.chain(fitting, files), None)
+
+    def _has_markers_of(self, truth: Path) -> bool:
+        """Whether a TRC file names a marker of the session's body."""
+        try:
+            names = _marker_names(truth, truth.stat().st_mtime_ns)
+            body = load_body(self.manifest.body, self.body_folders)
+        except (StudioError, OSError):
+            return False
+        return any(marker.name in names for marker in body.markers)
 
     def thumbnail(self) -> Path | None:
         """A small picture of the session (JPEG), made on first use; None if the footage cannot be read."""

@@ -37,6 +37,8 @@ export function modelOf(setup) {
   const here = runPath(setup.session, run.name);
   const answer = signal(/** @type {Answer | null} */ (null));
   const tracks = signal(/** @type {Schemas["TrackList"]["tracks"]} */ ([]));
+  /** Why no track can be measured though there is a truth. */
+  const truthProblem = signal("");
   const track = signal("");
   /** What is being done. */
   const job = signal(/** @type {any} */ (null));
@@ -77,6 +79,7 @@ export function modelOf(setup) {
     batch(() => {
       answer.value = checked;
       tracks.value = listed.tracks;
+      truthProblem.value = listed.truth_problem;
       track.value = checked.track;
       showAgain();
     });
@@ -120,13 +123,14 @@ export function modelOf(setup) {
     job.value = null;
   }
 
-  load().catch(complain);
+  load().catch(into(failed));
   return {
     setup,
     run,
     here,
     answer,
     tracks,
+    truthProblem,
     track,
     job,
     failed,
@@ -347,7 +351,8 @@ const TrackChoice = (/** @type {any} */ { model, line: { name, made_by: made } }
 /** The tracks, and what makes better ones. @param {{ model: Model }} properties */
 function Better({ model }) {
   const tracks = model.tracks.value;
-  const hasTruth = model.setup.detail.has_truth;
+  const problem = model.truthProblem.value;
+  const hasTruth = model.setup.detail.has_truth && !problem;
   const begin = (
     /** @type {string} */ verb,
     /** @type {string} */ made,
@@ -369,6 +374,7 @@ function Better({ model }) {
         ...(hasTruth ? [millimetres(line.mean_mm)] : []),
       ])}
     />
+    ${problem && html`<p class="notice">How far the tracks are from the truth is not known. ${problem}</p>`}
     <div class="step-actions">
       ${begin("refine", "refined", "Refine on the silhouettes", "Refine again")}
       ${begin("smooth", "smoothed", "Smooth in time", "Smooth again")}
@@ -383,7 +389,7 @@ function Better({ model }) {
 
 /** @param {{ model: Model }} properties */
 export function Panel({ model }) {
-  if (!model.answer.value) return null;
+  if (!model.answer.value) return html`<${Failure} error=${model.failed.value} />`;
   const job = model.job.value;
   const { detail } = model.setup;
   const cancel = () => remove(`/api/track-jobs/${job.identifier}`).catch(complain);

@@ -40,9 +40,13 @@ Verb = Literal["refine", "smooth", "correct", "pose", "check", "landmarks"]
 
 
 class TrackList(Answer):
-    """The run's tracks, raw first, those under way, and the knobs of refining and smoothing."""
+    """The run's tracks, raw first, those under way, and the knobs of refining and smoothing.
+
+    truth_problem: why no track can be measured though there is a truth.
+    """
 
     tracks: Annotated[tuple[TrackLine, ...], Shown]
+    truth_problem: str
     running: list["TrackJobState"]
     refine_settings: list[Annotated[Knob, Shown]]
     smooth_settings: list[Annotated[Knob, Shown]]
@@ -88,8 +92,10 @@ def begin_job(
 def tracks(session: OpenSession, run: RunInPath, app: App) -> TrackList:
     """The run's tracks with how much they jitter and, where there is a truth, how far off they are."""
     going = [state for state in app.jobs.going(TRACK, session.name) if state.run == run.name]
+    lines, problem = track_lines(session, run)
     return TrackList(
-        tracks=track_lines(session, run),
+        tracks=lines,
+        truth_problem=problem,
         running=going,
         refine_settings=list(knobs_of(RefinementSettings)),
         smooth_settings=list(knobs_of(SmoothingSettings)),

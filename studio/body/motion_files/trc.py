@@ -77,6 +77,12 @@ def read_trc(path: Path, up: str = "y") -> MarkerMotion:
         return _motion(path, read_foreign_text(path).splitlines(), up)
 
 
+def read_marker_names(path: Path) -> tuple[str, ...]:
+    """The names of a TRC file's markers, from its header alone. Raises TruthError."""
+    with foreign_file(path, TruthError, "a TRC file", "Export it again."):
+        return _header(path, read_foreign_text(path).splitlines()[:HEADER_LINES]).names
+
+
 def _motion(path: Path, lines: list[str], up: str) -> MarkerMotion:
     header = _header(path, lines)
     rows = [

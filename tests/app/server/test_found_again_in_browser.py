@@ -13,6 +13,7 @@ from web_doubles import TOKEN, Studio, state_of
 
 from studio.app.server import background_routes, track_routes
 from studio.body.model import BodyModel
+from studio.body.motion_files.trc import MarkerMotion, write_trc
 from studio.foundations.errors import RunError
 from studio.foundations.progress import Progress
 from studio.operations import person
@@ -438,3 +439,21 @@ def test_a_session_without_a_run_shows_its_footage(context: BrowserContext, stud
     expect(views.first).to_have_attribute("src", re.compile("/frames/2/views/cam1"))
     page.goto(f"{studio.base}/comparisons?session=take1")
     page.wait_for_url("**/comparisons?new*")
+
+
+def test_a_truth_that_fits_no_marker_empties_no_page(
+    context: BrowserContext, studio: Studio, tracked: StoredRun
+) -> None:
+    place = tracked.folder.parents[1] / "truth"
+    place.mkdir()
+    write_trc(
+        place / "points.trc", MarkerMotion(("EarL",), np.arange(2) / 25.0, np.ones((2, 1, 3)), "mm", 25.0)
+    )
+    page = opened(context, studio, "/way?session=take1&step=check")
+    expect(page.get_by_role("button", name="Check the motion")).to_be_visible()
+    expect(page.get_by_label("Show raw")).to_be_checked()
+    expect(page.locator("#step table")).not_to_contain_text("from truth")
+    expect(page.locator("#step .notice", has_text="The truth's markers (EarL")).to_have_count(1)
+    page = opened(context, studio, "/?session=take1&run=first")
+    expect(page.locator(".toast.warning")).to_contain_text("The truth's markers (EarL")
+    expect(page.locator(".toast.error")).to_have_count(0)

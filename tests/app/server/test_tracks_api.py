@@ -7,7 +7,7 @@ from tracked_runs import finish
 from web_doubles import Studio
 
 from studio.body.forward_kinematics import marker_points
-from studio.body.motion_files.trc import MarkerMotion
+from studio.body.motion_files.trc import MarkerMotion, write_trc
 from studio.runs.new_run import prepare_run
 from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.stored_run import StoredRun
@@ -106,6 +106,43 @@ def test_corrected_on_and_back(studio: Studio, run: StoredRun) -> None:
     back = begun(studio, "correct", {"frame": 4, "track": "raw", "back_to": 1, "name": "back"})
     assert (back["state"], back["made_run"], back["moved"]) == ("done", "back", 4), back
     studio.get("/api/track-jobs/none", code=404)
+
+
+def write_truth(run: StoredRun, stem: str, names: tuple[str, ...]) -> None:
+    """A truth of the toy arm: the markers of its run, 30 mm aside, under other names."""
+    track, place = read_track(run), run.folder.parents[1] / "truth"
+    markers = marker_points(run.body(), track.poses)[:, : len(names)] + np.array([30.0, 0.0, 0.0])
+    place.mkdir(exist_ok=True)
+    motion = MarkerMotion(names, track.frames / run.record.fps, markers, "mm", run.record.fps)
+    write_trc(place / f"{stem}.trc", motion)
+
+
+def test_a_truth_of_other_names_leaves_the_list_of_tracks_and_is_named(
+    studio: Studio, run: StoredRun
+) -> None:
+    write_truth(run, "points", ("EarL", "EarR"))
+    assert begun(studio, "smooth", {})["state"] == "done"
+    listed = studio.get(f"{RUN}/tracks")
+    assert [line["name"] for line in listed["tracks"]] == ["raw", "smoothed"]
+    assert [line["mean_mm"] for line in listed["tracks"]] == [None, None]
+    assert all(line["jitter_mm"] is not None for line in listed["tracks"])
+    assert "EarL" in listed["truth_problem"]
+    studio.get(f"{RUN}/check")
+
+
+def test_of_several_truths_the_one_that_fits_the_body_is_taken(studio: Studio, run: StoredRun) -> None:
+    names = tuple(marker.name for marker in run.body().markers)
+    write_truth(run, "points", ("EarL", "EarR"))
+    write_truth(run, "points_by_the_arms_names", names)
+    listed = studio.get(f"{RUN}/tracks")
+    assert listed["truth_problem"] == ""
+    assert listed["tracks"][0]["mean_mm"] == pytest.approx(30.0, abs=0.1)
+    # Of a body of other names it is the first one, which the run cannot be measured against.
+    studio.put("/api/sessions/toy/subject", {"body": "mouse"})
+    listed = studio.get(f"{RUN}/tracks")
+    assert "EarL" in listed["truth_problem"]
+    assert studio.get(f"{RUN}/frames")["truth_problem"] == listed["truth_problem"]
+    studio.get("/api/sessions/toy")
 
 
 def test_a_track_is_measured_against_the_joints_of_a_network(

@@ -14,6 +14,9 @@ export const RAW = "raw";
 /** The tracks of the run that is open. */
 const tracks = signal(/** @type {any[]} */ ([]));
 
+/** The reason why the truth cannot be used that was said last: once is enough. */
+let saidProblem = "";
+
 /** Whether the open run has a track. @param {string} name */
 export const hasTrack = (name) => tracks.value.some((track) => track.name === name);
 
@@ -46,6 +49,9 @@ export async function loadTracks() {
     const known = await fetchJson(`${runPath(session, run)}/tracks`);
     if (session !== get("session") || run !== get("run")) return;
     tracks.value = known.tracks;
+    if (known.truth_problem && known.truth_problem !== saidProblem)
+      say("The errors cannot be measured.", { remedy: known.truth_problem, kind: "warning" });
+    saidProblem = known.truth_problem;
     if (hasTrack(get("track"))) return;
     const words = `${run} has no track “${get("track")}”: the poses as searched are shown.`;
     say(words, { kind: "warning" });
