@@ -7,6 +7,7 @@ import cv2
 import pytest
 from toy_session import FRAMES, make_session
 
+from studio.body.subject import Subject, write_subject
 from studio.evidence.strokes import Stroke
 from studio.foundations.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.runs.setup.workflow import workflow_of
@@ -66,6 +67,49 @@ def test_a_calibration_beside_the_footage_is_taken_over(empty, raw, made):
     added = add_footage(empty, raw, ImportOptions(fps=60.0))
     assert added.calibrated
     assert [camera.name for camera in added.session.cameras()] == ["front"]
+
+
+@pytest.fixture
+def animals(tmp_path: Path) -> Session:
+    """An empty session, begun for an animal."""
+    return begin_session(tmp_path / "mouse", body="mouse31")
+
+
+def test_the_body_of_a_session_stays_where_footage_comes_with_a_calibration(
+    animals: Session, raw: Path, made: Session
+) -> None:
+    shutil.copytree(made.path / "calibration", raw / "calibration")
+    added = add_footage(animals, raw, ImportOptions(fps=60.0, allow_inconsistent=True))
+    assert added.calibrated
+    assert Session(animals.path).manifest.body == "mouse31"
+    assert not any("mouse31" in note for note in added.notes)
+
+
+@pytest.mark.parametrize("measures", ["", "height_mm = 400\n"])
+def test_only_a_subject_that_names_its_body_changes_it_and_that_is_said(
+    animals: Session, raw: Path, made: Session, measures: str
+) -> None:
+    shutil.copytree(made.path / "calibration", raw / "calibration")
+    (raw / "subject.toml").write_text(measures or 'body = "planar_arm4"\n')
+    added = add_footage(animals, raw, ImportOptions(fps=60.0, allow_inconsistent=True))
+    body = added.session.manifest.body
+    assert body == ("mouse31" if measures else "planar_arm4")
+    told = [note for note in added.notes if "'planar_arm4', which takes the place of 'mouse31'" in note]
+    assert len(told) == (0 if measures else 1)
+    assert set(told) <= set(added.session.manifest.notes)
+    subject = added.session.subject()
+    assert subject is not None
+    assert subject.body == body
+
+
+def test_measures_that_a_session_has_stay_with_their_body(animals: Session, raw: Path, made: Session) -> None:
+    write_subject(Subject("mouse31"), animals.path / "subject.toml")
+    shutil.copytree(made.path / "calibration", raw / "calibration")
+    (raw / "subject.toml").write_text('body = "planar_arm4"\n')
+    added = add_footage(animals, raw, ImportOptions(fps=60.0, allow_inconsistent=True)).session
+    subject = added.subject()
+    assert subject is not None
+    assert (added.manifest.body, subject.body) == ("mouse31", "mouse31")
 
 
 def test_footage_is_replaced_and_old_files_are_gone(empty, raw, tmp_path):

@@ -56,7 +56,14 @@ from studio.sessions.importers.writing import (
 from studio.sessions.manifest import FASTEST, SessionManifest
 from studio.sessions.names import free_name
 from studio.sessions.provenance import adopt
-from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, check_unchanged, redescribe
+from studio.sessions.session import (
+    CAMERAS_PATH,
+    SUBJECT_NAME,
+    THUMBNAIL_NAME,
+    Session,
+    check_unchanged,
+    redescribe,
+)
 from studio.sessions.stroke_files import OUTDATED, STROKES_NAME
 from studio.sessions.work_under_way import check_alone, one_at_a_time, working_on
 
@@ -242,9 +249,10 @@ def add_footage(
     """Add the footage (with masks and backgrounds) of a folder, or of an archive of one, to a session.
 
     A session that is calibrated keeps its calibration, which has to name every camera; else the source's is taken
-    over where it has one (and subject, start pose and truth, where the session has none). An existing camera
-    gets the new footage. All is read before anything changes, and no other work in the session is under way then; on
-    failure the session is unchanged. Raises StudioError.
+    over where it has one (and subject, start pose and truth, where the session has none). The session keeps its body,
+    unless the subject that is taken over names another. An existing camera gets the new footage. All is read before
+    anything changes, and no other work in the session is under way then; on failure the session is unchanged. Raises
+    StudioError.
     """
     options = options or ImportOptions()
     _check_request(source, options)
@@ -260,7 +268,13 @@ def _add(session: Session, source: Path, options: ImportOptions, report: Progres
     takes_over = plan.calibration is not None and not session.is_calibrated
     if not takes_over:
         plan = plan.without_person()
-    person = check_person(plan)
+    elif (session.path / SUBJECT_NAME).exists():
+        plan = replace(plan, subject=None, subject_file=None)
+    person = check_person(plan, session.manifest.body, session.body_folders)
+    if takes_over and person.body != session.manifest.body:
+        before = session.manifest.body
+        note = f"The imported subject is of body '{person.body}', which takes the place of '{before}'."
+        plan = replace(plan, notes=(*plan.notes, note))
     if options.copy:
         check_room(plan, session.path)
     read = _cameras_of(session, plan, options)

@@ -56,13 +56,21 @@ class CheckedPerson:
     size_mm: float = 0.0
 
 
-def check_person(plan: SourcePlan) -> CheckedPerson:
-    """Read everything about the person and the truth. Raises BodyError, TruthError."""
+def check_person(
+    plan: SourcePlan, usual: str = DEFAULT_BODY, body_folders: tuple[Path, ...] = ()
+) -> CheckedPerson:
+    """Read everything about the person and the truth.
+
+    usual : the body of a source that names none.
+    body_folders : searched for bodies after the source's own.
+
+    Raises BodyError, TruthError.
+    """
     subject = plan.subject
     if subject is None and plan.subject_file is not None:
         subject = read_subject(plan.subject_file, "")
-    folders = (plan.source / "bodies",) if plan.bodies else ()
-    body = load_body(_body_of(plan, subject), folders)
+    folders = (*((plan.source / "bodies",) if plan.bodies else ()), *body_folders)
+    body = load_body(_body_of(plan, subject, usual, folders), folders)
     if subject is not None:
         subject = msgspec.structs.replace(subject, body=body.name)
     notes: tuple[str, ...] = ()
@@ -83,7 +91,7 @@ def check_person(plan: SourcePlan) -> CheckedPerson:
     return CheckedPerson(body.name, names, notes, size)
 
 
-def _body_of(plan: SourcePlan, subject: Subject | None) -> str:
+def _body_of(plan: SourcePlan, subject: Subject | None, usual: str, folders: tuple[Path, ...]) -> str:
     """The body that a source names; where it names none the usual one, or the first that has the dimensions of its
     subject and the parameters of its start pose.
     """
@@ -91,12 +99,12 @@ def _body_of(plan: SourcePlan, subject: Subject | None) -> str:
         return subject.body
     own = set(subject.dimensions_mm) | set(subject.ratios) if subject is not None else set[str]()
     columns = set(named_columns(plan.start_pose_file)) if plan.start_pose_file is not None else None
-    for name in (DEFAULT_BODY, *packaged_bodies()):
-        body = load_body(name)
+    for name in (usual, DEFAULT_BODY, *packaged_bodies()):
+        body = load_body(name, folders)
         posed = columns is None or {entry.name for entry in body.parameters} <= columns
         if own <= set(body.dimensions) and posed:
             return name
-    return DEFAULT_BODY
+    return usual
 
 
 def carried_truth(
