@@ -75,6 +75,7 @@ def gallery_command(call: Call) -> dict[str, object]:
             "missing": one.missing,
             "data": one.card.data,
             "commands": list(one.card.commands),
+            "left": list(one.card.left),
         }
         for one in listed.cards
     ]
@@ -82,13 +83,14 @@ def gallery_command(call: Call) -> dict[str, object]:
         return {
             "session": listed.made.name,
             "cards": cards,
+            "notes": list(listed.notes),
             "text": f"Session '{listed.made.name}' is there.",
         }
     how = {"sample": "bundled", "recipe": "rendered", "elsewhere": "imported"}
     lines: list[str] = []
     for one in listed.cards:
         card = one.card
-        state = "there" if one.there else (one.missing and "data missing") or how[card.kind]
+        state = "there" if one.there else (one.missing and "cannot be made") or how[card.kind]
         lines.append(f"{card.name:18} {state:14} {card.title}. {card.words}")
         lines += [f"{'':18} {'':14} {line}" for line in (card.data, *card.commands) if line and not one.there]
     return {"session": "", "cards": cards, "text": "\n".join(lines)}

@@ -1,24 +1,29 @@
 """The gallery: sessions that can be opened or made, one entry of a table each."""
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from studio.foundations.declaring import Terminal, Web, operation
-from studio.foundations.errors import NotFoundError, SessionError
+from studio.foundations.errors import NotFoundError, SessionError, StudioError, WorkCancelledError
 from studio.foundations.foreign_files import read_file
 from studio.foundations.package import assets_folder
 from studio.foundations.progress import Progress
 from studio.operations.jobs.job_runner import JobKind, SessionJob
-from studio.operations.progress import Reporting, reporting
-from studio.results.drawing_footage.real_data import missing_data, real_footage
+from studio.operations.masks import background, give_plates, mask_quality
+from studio.operations.person import initialise, subject
+from studio.operations.progress import Reporting, reporting, say
+from studio.results.drawing_footage.real_data import missing_data, real_data_folder, real_footage
 from studio.results.drawing_footage.recipe_file import find_recipe
 from studio.results.drawing_footage.recipes import synthesize
-from studio.sessions.atomic_files import discard
+from studio.runs.setup.background_setup import BackgroundSource
+from studio.sessions.atomic_files import discard, taken
+from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.importing import ImportOptions, Unit, add_footage
-from studio.sessions.manifest import FILE_NAME
+from studio.sessions.manifest import FILE_NAME, SessionManifest
 from studio.sessions.samples import install_prepared_runs, install_sample, sample_folder
 from studio.sessions.session import Session, thumbnail_of
 from studio.sessions.workspace import Workspace, begin_session
@@ -36,6 +41,11 @@ class Card:
     footage : where a copy of it lies in the folder of the real data, from which it is imported.
     unit, fps : of that footage, where it does not say; as of an import.
     commands : that make the session from it.
+    body, height_mm : its subject; a body that has a file's ending lies in the folder of the real data.
+    masks : the source of its masks, "" where they need somebody's hand.
+    plates : folder in the footage's with pictures of the empty room, "" where the import takes them.
+    exclude_unused : whether regions that no view's hull comes near do not count.
+    start_frame : in which its start pose is searched; None where it is not.
     guide : page of the guide on it.
     """
 
@@ -49,7 +59,20 @@ class Card:
     unit: Unit = ""
     fps: float | None = None
     commands: tuple[str, ...] = ()
+    body: str = ""
+    height_mm: float | None = None
+    masks: BackgroundSource | Literal[""] = ""
+    plates: str = ""
+    exclude_unused: bool = False
+    start_frame: int | None = None
     guide: str = ""
+
+    @property
+    def left(self) -> tuple[str, ...]:
+        """The commands that the making of the card leaves to the user."""
+        done = {"import": True, "subject": self.body or self.height_mm, "background": self.masks,
+                "initialise": self.start_frame is not None}  # fmt: skip
+        return tuple(line for line in self.commands if not done.get(line.split()[1]))
 
 
 CYLINDER = (
@@ -118,6 +141,7 @@ CARDS = (
             "studio background mouse --source strokes --strokes strokes.json --no-tune --quality",
             "studio initialise mouse",
         ),
+        body="mouse",
         guide="/guide/animal",
     ),
     Card(
@@ -133,6 +157,9 @@ CARDS = (
             "studio background rearing --source animal --plates three-a/background",
             "studio initialise rearing --frame 6",
         ),
+        body="mouse31",
+        masks="animal",
+        start_frame=6,
         guide="/guide/animal",
     ),
     Card(
@@ -148,6 +175,9 @@ CARDS = (
             "studio background cylinder --source animal --plates five/background",
             "studio initialise cylinder",
         ),
+        body="mouse31",
+        masks="animal",
+        start_frame=0,
         guide="/guide/animal",
     ),
     Card(
@@ -164,6 +194,8 @@ CARDS = (
             "studio subject med7 --body robot-lbr-med7/model/lbr_med7.urdf",
             "studio initialise med7",
         ),
+        body="robot-lbr-med7/model/lbr_med7.urdf",
+        start_frame=0,
         guide="/guide/adding#a-robot",
     ),
     Card(
@@ -182,6 +214,7 @@ CARDS = (
             "studio body-from-film fly --like fly48 --as my-fly",
             "studio carry-clicks fly --body my-fly --held --first 0 --last 15",
         ),
+        body="fly48",
         guide="/guide/animal",
     ),
     Card(
@@ -207,11 +240,16 @@ CARDS = (
         footage="pose2sim-balance",
         commands=(
             "studio import pose2sim-balance --into balance",
+            "studio subject balance --height 1800",
             "studio background balance --source combined --plates pose2sim-balance/calibration/extrinsics"
             " --exclude unused",
-            "studio subject balance --height 1800",
             "studio initialise balance",
         ),
+        height_mm=1800.0,
+        masks="combined",
+        plates="calibration/extrinsics",
+        exclude_unused=True,
+        start_frame=0,
         guide="/guide",
     ),
 )
@@ -224,17 +262,24 @@ GALLERY_PICTURES = assets_folder() / "gallery"
 class CardStanding:
     """A card in a workspace.
 
-    there : whether a session of its name exists.
+    session : the name of the session that was made of it, "" where there is none.
     missing : why it cannot be made here, "" if it can.
     """
 
     card: Card
-    there: bool
+    session: str = ""
     missing: str = ""
+
+    @property
+    def there(self) -> bool:
+        """Whether it was made."""
+        return bool(self.session)
 
 
 class GalleryState(SessionJob):
-    """How the making of a card's session stands."""
+    """How the making of a card's session stands. notes: what could not be done after the import."""
+
+    notes: list[str] = Field(default_factory=list)
 
 
 GALLERY = JobKind(
@@ -253,9 +298,11 @@ class CardView:
     """A card.
 
     there : whether its session is in the workspace.
+    session : the name of that.
     missing : why it cannot be made here, "" if it can.
     data : where footage or motion that is not shipped comes from.
     commands : that make the session.
+    left : those of them that the making of the card leaves to the user.
     guide : page of the guide on it.
     picture : whether it has one.
     job : how its making stands.
@@ -266,9 +313,11 @@ class CardView:
     words: str
     kind: CardKind
     there: bool
+    session: str
     missing: str
     data: str
     commands: tuple[str, ...]
+    left: tuple[str, ...]
     guide: str
     picture: bool
     job: GalleryState | None
@@ -280,10 +329,12 @@ class Gallery:
 
     cards : all of them, with what each lacks.
     made : the session of the requested card.
+    notes : what could not be done after its import.
     """
 
     cards: tuple[CardStanding, ...]
     made: Session | None = None
+    notes: tuple[str, ...] = ()
 
 
 @operation
@@ -305,17 +356,21 @@ def gallery(
     exact truth.
 
     A session that exists is kept. For footage that cannot be shipped it says where it comes from and which commands
-    make the session; it is imported where the folder that STUDIO_REAL_DATA names has a copy.
+    make the session; where the folder that STUDIO_REAL_DATA names has a copy, it is imported, and of the other commands
+    those are done that need nobody's hand: the body, the masks, the start pose.
 
     Raises NotFoundError for an unknown card, SessionError for one whose footage is not available.
     """
     workspace = Workspace()
-    made = None
+    made, notes = None, ()
     if make:
+        card = card_of(make)
         with reporting(progress, make) as report:
-            place = workspace.place_for(into or make) if into else workspace.root / make
-            made = make_card(card_of(make), place, frames, report)
-    return Gallery(tuple(standing_of(card, workspace) for card in CARDS), made)
+            known = standing_of(card, workspace).session or make
+            place = workspace.place_for(into) if into else workspace.root / known
+            made, notes = make_card(card, place, frames, report)
+        say(progress, notes)
+    return Gallery(standings(workspace), made, notes)
 
 
 def card_of(name: str) -> Card:
@@ -326,29 +381,73 @@ def card_of(name: str) -> Card:
     return cards[name]
 
 
+def standings(workspace: Workspace) -> tuple[CardStanding, ...]:
+    """All cards in a workspace, in the order in which they are shown."""
+    manifests = workspace.manifests()
+    return tuple(_standing(card, workspace, manifests) for card in CARDS)
+
+
 def standing_of(card: Card, workspace: Workspace) -> CardStanding:
-    exists = (workspace.root / card.name / FILE_NAME).is_file()
-    if card.kind == "recipe":
-        return CardStanding(card, exists, missing_data(find_recipe(card.recipe or card.name)))
+    return _standing(card, workspace, workspace.manifests())
+
+
+def _standing(card: Card, workspace: Workspace, manifests: Mapping[str, SessionManifest]) -> CardStanding:
+    name = _made_of(card, manifests)
+    if card.kind == "recipe" and (missing := missing_data(find_recipe(card.recipe or card.name))):
+        return CardStanding(card, name, missing)
     if card.kind == "elsewhere" and real_footage(card.footage) is None:
-        return CardStanding(
-            card, exists, f"There is no '{card.footage}' in the folder that STUDIO_REAL_DATA names."
-        )
-    return CardStanding(card, exists)
+        missing = f"There is no '{card.footage}' in the folder that STUDIO_REAL_DATA names."
+        return CardStanding(card, name, missing)
+    if not name and (workspace.root / card.name).exists():
+        missing = f"Its name, '{card.name}', is taken in this workspace: rename the session that has it."
+        return CardStanding(card, name, missing)
+    return CardStanding(card, name)
 
 
-def card_view(card: Card, workspace: Workspace, job: GalleryState | None) -> CardView:
+def _made_of(card: Card, manifests: Mapping[str, SessionManifest]) -> str:
+    """The name of the session that was made of a card, the card's own before others; "" where there is none."""
+    own = [name for name in (card.name,) if name in manifests]
+    others = [name for name in manifests if name != card.name] if card.kind == "elsewhere" else []
+    return next((name for name in (*own, *others) if _is_of(card, name, manifests[name])), "")
+
+
+def _is_of(card: Card, name: str, manifest: SessionManifest) -> bool:
+    """Whether a session came from a card: by what it says of its origin, else by its name and its footage's files."""
+    if card.kind != "elsewhere":
+        return manifest.imported_from in ("", f"recipe {card.recipe or card.name}.toml")
+    origin, wanted = PurePath(manifest.imported_from).parts, PurePath(card.footage).parts
+    if origin[-len(wanted) :] == wanted:
+        return True
+    if name != card.name:
+        return False
+    return origin[-1:] == wanted[-1:] or _has_footage_of(card, manifest)
+
+
+def _has_footage_of(card: Card, manifest: SessionManifest) -> bool:
+    """Whether a session's footage has the names of a card's, as far as there is a copy of that."""
+    source = real_footage(card.footage)
+    try:
+        footage = () if source is None else plan_folder(source, None, bare=True).footage
+    except StudioError:
+        return False
+    names = {PurePath(camera.path).name for camera in manifest.footage.cameras}
+    return bool(names) and names == {path.name for path in footage}
+
+
+def card_view(standing: CardStanding, job: GalleryState | None) -> CardView:
     """A card for a page. job : how its making stands."""
-    standing = standing_of(card, workspace)
+    card = standing.card
     return CardView(
         name=card.name,
         title=card.title,
         words=card.words,
         kind=card.kind,
         there=standing.there,
+        session=standing.session,
         missing=standing.missing,
         data=card.data,
         commands=card.commands,
+        left=card.left,
         guide=card.guide,
         picture=standing.there or card.kind == "sample" or _shipped_picture(card).is_file(),
         job=job,
@@ -361,8 +460,8 @@ def card_picture(card: Card, workspace: Workspace) -> bytes:
     Raises NotFoundError where it has none.
     """
     path = _shipped_picture(card)
-    if standing_of(card, workspace).there:
-        path = workspace.session(card.name).thumbnail()
+    if name := standing_of(card, workspace).session:
+        path = workspace.session(name).thumbnail()
     elif card.kind == "sample" and (content := thumbnail_of(Session(sample_folder(card.name)))) is not None:
         return content
     if path is None or not path.is_file():
@@ -374,32 +473,86 @@ def _shipped_picture(card: Card) -> Path:
     return GALLERY_PICTURES / f"{card.name}.jpg"
 
 
-def make_card(card: Card, place: Path, frames: int | None, progress: Progress) -> Session:
-    """The session of a card at a place; an existing one is opened. Raises StudioError; then nothing was made."""
+def make_card(
+    card: Card, place: Path, frames: int | None, progress: Progress
+) -> tuple[Session, tuple[str, ...]]:
+    """The session of a card at a place, and what could not be done after its import; an existing one is opened.
+
+    Raises StudioError, also for a place that another session has; then nothing was made.
+    """
     if (place / FILE_NAME).is_file():
-        return Session(place)
+        session = Session(place)
+        if not _is_of(card, place.name, session.manifest):
+            raise taken(place)
+        return session, ()
     if card.kind == "elsewhere":
         return _imported(card, place, progress)
     if card.kind == "sample":
-        return install_sample(Workspace(place.parent), card.name, place.name)
-    return Session(synthesize(card.recipe or card.name, place, progress, frames))
+        return install_sample(Workspace(place.parent), card.name, place.name), ()
+    return Session(synthesize(card.recipe or card.name, place, progress, frames)), ()
 
 
-def _imported(card: Card, place: Path, progress: Progress) -> Session:
-    """The session of footage that is not shipped, with the calibration beside it, if any."""
+def _imported(card: Card, place: Path, progress: Progress) -> tuple[Session, tuple[str, ...]]:
+    """The session of footage that is not shipped, with the calibration beside it, if any, set up as far as that needs
+    nobody's hand; and what could not be done. Nothing is left of one that is cancelled.
+    """
     source = real_footage(card.footage)
     if source is None:
         raise SessionError(
             f"The footage of '{card.name}' cannot be shipped.",
             f"It comes from {card.data} Put it at '{card.footage}' into the folder that STUDIO_REAL_DATA names.",
         )
-    session = begin_session(place, card.title)
+    is_file = bool(PurePath(card.body).suffix)
+    session = begin_session(place, card.title, str(real_data_folder() / card.body) if is_file else card.body)
     try:
         options = ImportOptions(unit=card.unit, fps=card.fps)
-        return add_footage(session, source, options, progress=progress).session
+        add_footage(session, source, options, progress=progress)
+        notes = _set_up(card, place, source, progress)
     except BaseException:
         discard(place)
         raise
+    return Session(place), notes
+
+
+def _set_up(card: Card, place: Path, source: Path, progress: Progress) -> tuple[str, ...]:
+    """Do what follows a card's import up to the first step that fails, and say why that failed. Raises
+    WorkCancelledError.
+    """
+    for verb, do in _steps(card, source):
+        try:
+            do(Session(place), progress)
+        except WorkCancelledError:
+            raise
+        except StudioError as problem:
+            return (
+                f"The footage is imported; its {verb} could not be set up. {problem.message} {problem.hint}",
+            )
+    return ()
+
+
+def _steps(card: Card, source: Path) -> Iterator[tuple[str, Callable[[Session, Progress], object]]]:
+    """What follows a card's import: a name, and what does it to the session. source : the folder of its footage."""
+
+    def take_subject(session: Session, progress: Progress) -> object:
+        return subject(session, card.height_mm, body=session.manifest.body, progress=progress)
+
+    def make_masks(session: Session, progress: Progress) -> object:
+        if card.plates:
+            plates = sorted(path for path in (source / card.plates).iterdir() if path.is_file())
+            session = give_plates(session, {}, plates)
+        background(session, card.masks or "masks", exclude_unused=card.exclude_unused, progress=progress)
+        made = Session(session.path)
+        return mask_quality(made, progress=progress) if made.is_comparable else None
+
+    def find_start(session: Session, progress: Progress) -> object:
+        return initialise(session, card.start_frame or 0, progress=progress)
+
+    if card.body or card.height_mm:
+        yield "subject", take_subject
+    if card.masks:
+        yield "background", make_masks
+    if card.start_frame is not None:
+        yield "start pose", find_start
 
 
 def prepare_demo(workspace_root: Path) -> Session:

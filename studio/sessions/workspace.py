@@ -1,5 +1,6 @@
 """The folder in which a person's sessions live: listing, naming, copying, throwing away."""
 
+import contextlib
 import dataclasses
 import os
 import shutil
@@ -20,7 +21,7 @@ from studio.foundations.progress import Progress, no_progress
 from studio.sessions import atomic_files
 from studio.sessions.atomic_files import made_whole, write_text
 from studio.sessions.file_checksums import forget_files, note_again
-from studio.sessions.manifest import FILE_NAME, SessionManifest, now, write_manifest
+from studio.sessions.manifest import FILE_NAME, SessionManifest, now, read_manifest, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.object_stores import folder_of, is_address
 from studio.sessions.remote_sessions import remote_session
@@ -77,6 +78,14 @@ class Workspace:
     def sessions(self) -> tuple[SessionSummary, ...]:
         """All sessions by name, with their runs; those that cannot be opened carry the reason."""
         return tuple(_summary(folder) for folder in _named_folders(self.root, FILE_NAME))
+
+    def manifests(self) -> dict[str, SessionManifest]:
+        """What all sessions that can be read say of themselves, by name."""
+        read: dict[str, SessionManifest] = {}
+        for folder in _named_folders(self.root, FILE_NAME):
+            with contextlib.suppress(StudioError):
+                read[folder.name] = read_manifest(folder)
+        return read
 
     def usual_body(self) -> str:
         """The body of most sessions, of several the newest session's; else that of a new session."""

@@ -6,7 +6,6 @@ import {
   actions,
   button,
   byId,
-  dotted,
   drawProgress,
   element,
   failure,
@@ -35,7 +34,25 @@ const grid = element("div", { className: "gallery" });
 /** @returns {`/api/gallery/${string}`} */
 const pathOf = (name) => `/api/gallery/${encodeURIComponent(name)}`;
 
-/** Draw a card into its place. @param {Card} card */
+/** Where a card's session is. @param {Card} card */
+const placeOf = (card) =>
+  card.session === card.name ? "in this workspace" : `in this workspace as ${card.session}`;
+
+/** What the commands do that are left after the making of a card, such as "track, evaluate". @param {Card} card */
+const leftOf = (card) => card.left.map((line) => line.split(" ")[1]).join(", ");
+
+/** What the import of a card does of its commands. @param {Card} card */
+const importWords = (card) =>
+  card.left.length
+    ? `Import does all of this but what needs you: ${leftOf(card)}.`
+    : "Import does all of this, which takes some minutes.";
+
+/**
+ * Draw a card into its place. wrong : why something could not be done.
+ * @param {HTMLElement} place
+ * @param {Card} card
+ * @param {any} [wrong]
+ */
 function draw(place, card, wrong = null) {
   const progress = optional();
   const wait = () => follow(place, card).catch((error) => draw(place, card, error));
@@ -75,10 +92,13 @@ function draw(place, card, wrong = null) {
       "div",
       { className: "card-words" },
       element("h2", {}, card.title),
-      hint(dotted(card.there ? "in this workspace" : KINDS[card.kind])),
+      hint(card.there ? placeOf(card) : KINDS[card.kind]),
       element("p", {}, card.words),
       !card.there && card.data && hint(`Data: ${card.data}`),
-      !card.there && card.missing && hint(`Cannot be made here yet. ${card.missing}`),
+      !card.there && !going && card.missing && hint(`Cannot be made here yet. ${card.missing}`),
+      card.there &&
+        card.left.length > 0 &&
+        hint(`The import leaves to you: ${leftOf(card)}. The guided set-up leads on.`),
       (!card.there || card.kind === "elsewhere") &&
         card.commands.length > 0 &&
         element(
@@ -87,12 +107,15 @@ function draw(place, card, wrong = null) {
           element("summary", {}, "Made by these commands"),
           element("pre", { tabIndex: 0 }, card.commands.join("\n")),
         ),
+      can && card.kind === "elsewhere" && hint(importWords(card)),
       progress,
       failure(wrong),
     ),
     actions(
-      card.there && element("a", { className: "download", href: studioPath(card.name) }, "Open"),
-      card.there && !readOnly && element("a", { href: setupPath(card) }, "Guided set-up"),
+      card.there && element("a", { className: "download", href: studioPath(card.session) }, "Open"),
+      card.there &&
+        !readOnly &&
+        element("a", { href: setupPath({ name: card.session }) }, "Guided set-up"),
       can &&
         !going &&
         button(MAKE[card.kind], make, "primary", { ariaLabel: `${MAKE[card.kind]} ${card.title}` }),
@@ -140,7 +163,14 @@ async function follow(place, card) {
       return;
     }
     const { cards } = await fetchJson("/api/gallery");
-    draw(place, cards.find((one) => one.name === card.name) ?? card);
+    const notes = /** @type {Card["job"]} */ (job)?.notes ?? [];
+    draw(
+      place,
+      cards.find((one) => one.name === card.name) ?? card,
+      notes.length
+        ? { message: notes.join(" "), hint: "Go on with it in the guided set-up." }
+        : null,
+    );
   } catch (error) {
     card.job = null;
     draw(place, card, error);

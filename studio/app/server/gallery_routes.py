@@ -8,7 +8,6 @@ from studio.app.server import files
 from studio.app.server.answers import Router
 from studio.app.server.app_state import App
 from studio.operations.gallery import (
-    CARDS,
     GALLERY,
     CardView,
     GalleryState,
@@ -16,6 +15,8 @@ from studio.operations.gallery import (
     card_picture,
     card_view,
     make_card,
+    standing_of,
+    standings,
 )
 from studio.operations.jobs.job_runner import Job, SessionJob
 
@@ -32,7 +33,8 @@ class GalleryView:
 @router.get("")
 def gallery_cards(app: App) -> GalleryView:
     """The cards, and what can be done with each."""
-    return GalleryView([card_view(card, app.workspace, app.jobs.known(GALLERY, card.name)) for card in CARDS])
+    shown = standings(app.workspace)
+    return GalleryView([card_view(one, app.jobs.known(GALLERY, one.card.name)) for one in shown])
 
 
 @router.get("/{card}/picture.jpg", response_class=Response)
@@ -50,8 +52,9 @@ def begin_card(card: str, app: App) -> GalleryState:
         return going
 
     def work(job: Job) -> dict[str, object]:
-        make_card(wanted, app.workspace.root / wanted.name, None, job.report_or_stop)
-        return {}
+        place = app.workspace.root / (standing_of(wanted, app.workspace).session or wanted.name)
+        _, notes = make_card(wanted, place, None, job.report_or_stop)
+        return {"notes": list(notes)}
 
     return app.jobs.begin(GALLERY, GalleryState(session=wanted.name), work)
 

@@ -1,19 +1,26 @@
 """The gallery over HTTP: cards, sessions opened and made as jobs, and cards whose footage is elsewhere."""
 
 import dataclasses
+import threading
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from small_recipes import small
+from toy_session import make_session
 from waiting import until
 from web_doubles import Studio
 
+from studio.foundations.errors import RunError
+from studio.foundations.progress import Progress
 from studio.operations import gallery
 from studio.operations.gallery import CARDS, GALLERY_PICTURES, Card
 from studio.results.drawing_footage.clips import ClipWriter
 from studio.results.drawing_footage.recipe_file import recipe_names
+from studio.sessions.manifest import write_manifest
+from studio.sessions.workspace import begin_session
 
 SHORT = Card("stand", "Standing", "Almost still.")
 
@@ -115,6 +122,9 @@ def test_pictures_that_do_not_say_their_rate_have_the_cards(
     studio: Studio, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("STUDIO_REAL_DATA", str(tmp_path))
+    # Its body and meshes are not here.
+    still = dataclasses.replace(gallery.card_of("med7"), body="", start_frame=None)
+    monkeypatch.setattr(gallery, "CARDS", (still,))
     for name in ("left", "right"):
         folder = tmp_path / "robot-lbr-med7" / "pictures" / name
         folder.mkdir(parents=True)
@@ -125,6 +135,127 @@ def test_pictures_that_do_not_say_their_rate_have_the_cards(
     assert studio.get("/api/sessions/med7")["fps"] == 1.0
 
 
+@pytest.fixture
+def arm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Card:
+    """The one card is the toy arm, whose footage lies elsewhere."""
+    monkeypatch.setenv("STUDIO_REAL_DATA", str(tmp_path))
+    made = make_session(tmp_path / "films" / "toy")
+    for path in made.path.iterdir():
+        if path.name not in ("pictures", "masks", "calibration"):
+            path.unlink()
+    commands = tuple(
+        f"studio {verb} toy" for verb in ("import", "subject", "background", "initialise", "track")
+    )
+    only = Card(
+        "arm", "Arm", "It swings.", "elsewhere", footage="films/toy", unit="mm", fps=60.0, commands=commands,
+        body="planar_arm4", masks="masks", start_frame=2,
+    )  # fmt: skip
+    monkeypatch.setattr(gallery, "CARDS", (only,))
+    return only
+
+
+def test_the_import_of_a_card_goes_on_to_body_masks_and_start_pose(studio: Studio, arm: Card) -> None:
+    assert card(studio, "arm")["left"] == ["studio track toy"]
+    studio.post("/api/gallery/arm", code=202)
+    state = studio.ended("/api/gallery/arm")
+    assert (state["state"], state["notes"]) == ("done", [])
+    session = studio.workspace.session("arm")
+    assert session.manifest.body == "planar_arm4"
+    way = {step["step"]: step["state"] for step in studio.get("/api/sessions/arm/way")["steps"]}
+    assert [way[step] for step in ("background", "subject", "start-pose")] == ["done"] * 3
+    assert session.start_pose_frame() == 2
+    assert (card(studio, "arm")["there"], card(studio, "arm")["session"]) == (True, "arm")
+
+
+def test_what_cannot_be_done_after_the_import_is_said_and_the_import_stays(
+    studio: Studio, arm: Card, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise RunError("Nothing is to be seen.", "Take another frame.")
+
+    monkeypatch.setattr(gallery, "initialise", fails)
+    studio.post("/api/gallery/arm", code=202)
+    state = studio.ended("/api/gallery/arm")
+    assert state["state"] == "done"
+    assert "start pose" in state["notes"][0]
+    assert "Nothing is to be seen. Take another frame." in state["notes"][0]
+    assert card(studio, "arm")["there"] is True
+
+
+def test_a_card_that_is_cancelled_after_its_import_leaves_nothing(
+    studio: Studio, arm: Card, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    going = threading.Event()
+
+    def searches(*_: object, progress: Progress) -> None:
+        while True:
+            going.set()
+            progress("searching", 1, 4)
+
+    monkeypatch.setattr(gallery, "initialise", searches)
+    studio.post("/api/gallery/arm", code=202)
+    assert going.wait(60.0)
+    studio.delete("/api/gallery/arm", code=202)
+    assert studio.ended("/api/gallery/arm")["state"] == "cancelled"
+    assert not (studio.workspace.root / "arm").exists()
+
+
+def test_what_a_card_does_is_what_its_commands_say() -> None:
+    for one in CARDS:
+        words = " ".join(line for line in one.commands if line not in one.left)
+        assert [line.split()[1] for line in one.left if line.split()[1] == "import"] == []
+        for value, option in (
+            (one.body, f"--body {one.body}"),
+            (one.height_mm, f"--height {one.height_mm or 0:.0f}"),
+            (one.masks, f"--source {one.masks}"),
+            (one.plates, f"/{one.plates}"),
+            (one.exclude_unused, "--exclude unused"),
+            (one.start_frame, f"--frame {one.start_frame}"),
+        ):
+            assert (option in words) if value else value in ("", None, False, 0), (one.name, option)
+
+
+def make_empty(studio: Studio, name: str, origin: str) -> None:
+    made = begin_session(studio.workspace.root / name)
+    write_manifest(made.path, msgspec.structs.replace(made.manifest, imported_from=origin))
+
+
+def test_a_session_is_a_card_s_by_where_it_came_from_and_not_by_its_name(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("STUDIO_REAL_DATA", str(tmp_path))
+    for footage in ("three-a", "five"):
+        (tmp_path / "mouse-cylinder" / footage).mkdir(parents=True)
+    make_empty(studio, "cylinder", "/somewhere/mouse-cylinder/three-a")
+    assert (card(studio, "rearing")["there"], card(studio, "rearing")["session"]) == (True, "cylinder")
+    assert card(studio, "cylinder")["there"] is False
+    assert "'cylinder', is taken" in card(studio, "cylinder")["missing"]
+    studio.post("/api/gallery/cylinder")
+    assert studio.ended("/api/gallery/cylinder")["state"] == "failed"
+    studio.post("/api/gallery/rearing")
+    assert studio.ended("/api/gallery/rearing")["state"] == "done"
+    assert not (studio.workspace.root / "rearing").exists(), "the one that is there is opened"
+    make_empty(studio, "box", "/somewhere/of/mine")
+    assert card(studio, "box")["there"] is False
+    make_empty(studio, "handstand", "recipe handstand.toml")
+    assert card(studio, "handstand")["there"] is True
+    # What was uploaded is known by its folder, else by its files' names.
+    make_empty(studio, "fly", "/uploads/1234/fly")
+    assert card(studio, "fly")["there"] is True
+
+
+def test_uploaded_footage_of_a_card_s_name_is_known_by_its_files(
+    studio: Studio, arm: Card, tmp_path: Path
+) -> None:
+    session = make_session(studio.workspace.root / "arm")
+    write_manifest(session.path, msgspec.structs.replace(session.manifest, imported_from="/uploads/1234"))
+    assert card(studio, "arm")["there"] is True
+    (tmp_path / "films" / "toy" / "pictures" / "front").rename(
+        tmp_path / "films" / "toy" / "pictures" / "left"
+    )
+    assert card(studio, "arm")["there"] is False
+
+
 @pytest.mark.real_data
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [one.name for one in CARDS if one.kind == "elsewhere"])
@@ -132,7 +263,9 @@ def test_footage_of_others_is_imported_as_it_lies(real_data: Path, studio: Studi
     if card(studio, name)["missing"]:
         pytest.skip(f"the footage of {name} is not here")
     studio.post(f"/api/gallery/{name}")
-    assert studio.ended(f"/api/gallery/{name}")["state"] == "done"
+    until(lambda: studio.get(f"/api/gallery/{name}")["state"] in ("done", "failed"), 1800.0)
+    state = studio.get(f"/api/gallery/{name}")
+    assert (state["state"], state["notes"]) == ("done", [])
     assert studio.get(f"/api/sessions/{name}")["frame_count"] > 1
 
 
@@ -152,5 +285,5 @@ def test_what_cannot_be_made_says_why(
 
 def test_a_card_more_is_an_entry_more(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     more = dataclasses.replace(SHORT, name="another", recipe="stand")
-    monkeypatch.setattr("studio.app.server.gallery_routes.CARDS", (*CARDS, more))
+    monkeypatch.setattr(gallery, "CARDS", (*CARDS, more))
     assert card(studio, "another")["title"] == "Standing"
