@@ -155,7 +155,7 @@ def test_start_pose(guided: GuidedSetup) -> None:
     guided.stands("start-pose", "done")
     expect(guided.page.locator("figure.picture img[alt*='start pose']")).to_have_count(4)
     guided.shoot("start-pose")
-    guided.press("Yes, track from here")
+    guided.press("Yes, track all frames from here")
 
 
 def test_track_and_check(guided: GuidedSetup) -> None:

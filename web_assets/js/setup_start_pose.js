@@ -307,11 +307,14 @@ function Mending({ model }) {
         </p>`
     }
     <div class="step-actions">
-      ${act("Yes, track from here", () => model.setup.go("track", { begin: true }), "primary")}
+      ${act("Yes, track all frames from here", () => model.setup.go("track", { begin: true }), "primary")}
       ${hasSides && act("No: facing the other way", () => model.exchange("turned round"))}
       ${hasSides && act("Mirror", () => model.exchange("in place"))}
       ${act("Refine from here", model.refine)}
     </div>
+    <p class="hint">
+      For some of the frames, or with other settings, go on to step Track below: its form has them.
+    </p>
   `;
 }
 

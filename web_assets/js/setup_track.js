@@ -47,6 +47,8 @@ export function modelOf(setup, [choices, state]) {
   const runs = signal(setup.detail.runs);
   /** What the tracking process said last. */
   const work = signal(/** @type {Work} */ ({ type: "state", ...state }));
+  /** Whether a run is being made, which takes a while: nothing is said of it meanwhile. */
+  const isStarting = signal(false);
   /** Whether it said something since. */
   let isHeard = false;
   /** What is tracked backwards. */
@@ -144,6 +146,7 @@ export function modelOf(setup, [choices, state]) {
     choices,
     work,
     job,
+    isStarting,
     failed,
     isFormOpen,
     shown,
@@ -161,21 +164,26 @@ export function modelOf(setup, [choices, state]) {
     },
     /** Make a run as the form has it, and track it. @param {Record<string, any>} values */
     begin: async (values) => {
-      const { tracker, weighting, evaluations } = values;
-      const settings = Number(evaluations)
-        ? await fetchJson(`/api/evaluations?tracker=${tracker}&evaluations=${evaluations}`)
-        : {};
-      const made = await post(`${here}/runs`, {
-        tracker,
-        weighting,
-        first: Number(values.first),
-        last: Number(values.last) + 1,
-        settings,
-        allow_inconsistent: Boolean(values.inconsistent),
-      });
-      isFormOpen.value = false;
-      await loadRuns();
-      await start(made.name);
+      isStarting.value = true;
+      try {
+        const { tracker, weighting, evaluations } = values;
+        const settings = Number(evaluations)
+          ? await fetchJson(`/api/evaluations?tracker=${tracker}&evaluations=${evaluations}`)
+          : {};
+        const made = await post(`${here}/runs`, {
+          tracker,
+          weighting,
+          first: Number(values.first),
+          last: Number(values.last) + 1,
+          settings,
+          allow_inconsistent: Boolean(values.inconsistent),
+        });
+        isFormOpen.value = false;
+        await loadRuns();
+        await start(made.name);
+      } finally {
+        isStarting.value = false;
+      }
       await setup.refresh();
     },
     stop: () => {
@@ -197,6 +205,12 @@ const workWords = (work) =>
         work.seconds_left != null && `${duration(work.seconds_left)} left`,
       );
 
+/** @param {Model} model */
+const startingWords = (model) =>
+  model.setup.detail.has_start_pose
+    ? "starting… the body's shape is fitted to the first frames, which takes up to a minute"
+    : "starting… a start pose is searched for, and the body's shape fitted, which takes some minutes";
+
 /** What is being done, as `Progress` takes it; null where nothing is. @param {Model} model */
 function doingOf(model) {
   const [job, work] = [model.job.value, model.work.value];
@@ -209,6 +223,7 @@ function doingOf(model) {
       share: job.total ? job.done / job.total : 0,
       cancel: () => remove(`/api/track-jobs/${job.identifier}`).catch(complain),
     };
+  if (model.isStarting.value) return { words: startingWords(model), share: 0 };
   if (!model.isTracked()) return null;
   const share = work.last > work.first ? work.done / (work.last - work.first) : 0;
   return { words: workWords(work), share, cancel: model.cancel };
@@ -217,9 +232,9 @@ function doingOf(model) {
 /** The newest run: how far it is, and what can be done with it. @param {{ model: Model }} properties */
 function Status({ model }) {
   const run = model.newest();
-  if (!run) return null;
   const doing = doingOf(model);
   if (doing) return html`<section class="track-status"><${Progress} ...${doing} /></section>`;
+  if (!run) return null;
   const work = model.work.value;
   const count = run.last - run.first;
   const isStale = model.isStale();
@@ -314,7 +329,7 @@ function RunForm({ model }) {
     setSent(false);
   };
   const isFirst = !model.newest();
-  // "Yes, track from here": the run that waits, else a new one as the form has it.
+  // "Yes, track all frames from here": the run that waits, else a new one as the form has it.
   useLayoutEffect(() => {
     if (!model.setup.asked.begin || model.isTracked()) return;
     const [run, first] = [model.newest(), model.setup.detail.start_pose_frame];
@@ -331,7 +346,7 @@ function RunForm({ model }) {
       <${Fields} detail=${model.setup.detail} choices=${model.choices} />
       <div class="step-actions">
         <button type="submit" class="primary" disabled=${isSent}>
-          ${isFirst ? "Track" : "Track again"}
+          ${isSent ? "Starting…" : isFirst ? "Track" : "Track again"}
         </button>
       </div>
       <div class="optional" ref=${alert}><${Failure} error=${wrong} /></div>

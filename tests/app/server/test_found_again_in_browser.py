@@ -4,14 +4,16 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, WebSocketRoute, expect
 from waiting import until
 from web_doubles import TOKEN, Studio, state_of
 
-from studio.app.server import background_routes, track_routes
+from studio.app.server import background_routes, run_routes, track_routes
 from studio.body.model import BodyModel
 from studio.body.motion_files.trc import MarkerMotion, write_trc
 from studio.foundations.errors import RunError
@@ -24,8 +26,10 @@ from studio.runs.refining import MadeTrack
 from studio.runs.setup.subject_fitting import FitRequest, FittedSize, FittedSubject
 from studio.runs.tracks import RAW, read_track, write_track
 from studio.search.settings import values as settings_values
+from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import begin_session
 
 pytestmark = pytest.mark.browser
 
@@ -291,7 +295,7 @@ def test_the_header_tells_how_the_open_run_stands(
 
 
 def test_the_set_up_goes_back_step_by_step_and_tracks_when_it_says_so(
-    context: BrowserContext, studio: Studio
+    context: BrowserContext, studio: Studio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = opened(context, studio, "/way?session=take1&step=subject")
     page.wait_for_selector(STEP.format("subject"))
@@ -306,8 +310,19 @@ def test_the_set_up_goes_back_step_by_step_and_tracks_when_it_says_so(
     page.go_forward()
     page.wait_for_selector(STEP.format("start-pose"))
 
-    page.get_by_role("button", name="Yes, track from here").click()
+    real, go = run_routes.new_run, threading.Event()
+
+    def slow_run(session: Session, **request: object) -> StoredRun:
+        assert go.wait(60.0)
+        return real(session, **request)
+
+    monkeypatch.setattr(run_routes, "new_run", slow_run)
+    page.get_by_role("button", name="Yes, track all frames from here").click()
     page.wait_for_selector(STEP.format("track"))
+    expect(page.locator(".track-status")).to_contain_text("starting…")
+    expect(page.get_by_role("button", name="Starting…")).to_be_disabled()
+    assert not studio.workspace.session("take1").runs()
+    go.set()
     expect(page.locator(".track-status")).to_contain_text("compiling the kernels")
     [started] = [one for one in studio.control.commands if isinstance(one, Start)]
     assert started.session.endswith("/take1")
@@ -457,3 +472,21 @@ def test_a_truth_that_fits_no_marker_empties_no_page(
     page = opened(context, studio, "/?session=take1&run=first")
     expect(page.locator(".toast.warning")).to_contain_text("The truth's markers (EarL")
     expect(page.locator(".toast.error")).to_have_count(0)
+
+
+def test_a_card_names_the_session_that_was_made_of_it_and_what_its_import_leaves(
+    context: BrowserContext, studio: Studio, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("STUDIO_REAL_DATA", str(tmp_path))
+    for footage in ("mouse-cylinder/three-a", "mouse-cylinder/five", "fly"):
+        (tmp_path / footage).mkdir(parents=True)
+    made = begin_session(studio.workspace.root / "cylinder")
+    origin = str(tmp_path / "mouse-cylinder" / "three-a")
+    write_manifest(made.path, msgspec.structs.replace(made.manifest, imported_from=origin))
+    page = opened(context, studio, "/gallery")
+    rearing, taken, fly = (page.locator(f"[data-card={name}]") for name in ("rearing", "cylinder", "fly"))
+    expect(rearing).to_contain_text("in this workspace as cylinder")
+    expect(rearing.get_by_role("link", name="Open")).to_have_attribute("href", re.compile("session=cylinder"))
+    expect(taken).to_contain_text("Its name, 'cylinder', is taken in this workspace")
+    expect(taken.get_by_role("link", name="Open")).to_have_count(0)
+    expect(fly).to_contain_text("but what needs you: body-from-film, carry-clicks.")
