@@ -4,6 +4,7 @@ import html
 import json
 import re
 from dataclasses import replace
+from urllib.parse import urljoin
 
 import pytest
 from playwright.sync_api import Browser
@@ -195,6 +196,19 @@ def test_every_page_that_the_guide_refers_to_is_there(studio: Studio) -> None:
         *(f"/guide/{name}" for name in COURSE),
     }
     studio.get("/guide/nothing", code=404)
+
+
+def test_every_picture_of_the_guide_is_there_at_the_address_that_its_page_names(studio: Studio) -> None:
+    pictures = [
+        (place, urljoin(place, source))
+        for place in ("/guide", *(f"/guide/{name}" for name in (*GUIDE_PAGES, *COURSE)))
+        for source in re.findall(r'<img src="([^"]+)"', studio.client.get(place).text)
+    ]
+    assert "/guide/animal" in dict(pictures)
+    for place, address in pictures:
+        answer = studio.client.get(address)
+        assert answer.status_code == 200, (place, address)
+        assert answer.headers["content-type"].startswith("image/"), (place, address)
 
 
 def test_the_guide_links_to_the_page_of_python_examples(studio: Studio) -> None:
