@@ -326,6 +326,14 @@ function Witness(/** @type {{ model: Model }} */ { model }) {
   </section>`;
 }
 
+/** What was corrected of a track, folded: it may be a line for every few frames. @param {{ lines: string[] }} properties */
+const Corrections = ({ lines }) => html`<details class="corrections">
+  <summary>corrected in ${lines.length} ${lines.length === 1 ? "place" : "places"}</summary>
+  <ul>
+    ${lines.map((line) => html`<li>${line}</li>`)}
+  </ul>
+</details>`;
+
 /** A track's name, by which it is looked at. */
 const TrackChoice = (/** @type {any} */ { model, line: { name, made_by: made } }) => html`
   <label class="check">
@@ -339,7 +347,7 @@ const TrackChoice = (/** @type {any} */ { model, line: { name, made_by: made } }
     />
     ${name === "raw" ? "raw (as searched)" : name}
   </label>
-  ${Array.isArray(made.exchanged) && html`<p class="hint">${made.exchanged.join("; ")}</p>`}
+  ${Array.isArray(made.exchanged) && html`<${Corrections} lines=${made.exchanged} />`}
   ${
     name === model.answer.value?.usual &&
     html`<span class="badge good" title="Step Export takes this one, unless you choose another.">
