@@ -6,10 +6,8 @@ from studio.body.model import BodyModel
 from studio.cli.deriving import Call, command_of
 from studio.operations.person import Landmarks, fit_subject, initialise, landmarks, subject
 from studio.operations.subjects import subjects, together
-from studio.runs.setup.initialising import InitialPose
+from studio.runs.setup.initialising import UNSURE, InitialPose
 from studio.runs.setup.subject_fitting import FittedSubject
-
-UNSURE = 0.75
 
 
 @command_of(subject)

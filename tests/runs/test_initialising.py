@@ -1,5 +1,6 @@
 """A start pose found in a frame of a session, from pictures alone; what is written, and what is refused."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,17 @@ from studio.results.drawing_footage.person import marker_lengths, skeleton_of_he
 from studio.results.drawing_footage.recipe_file import Picture, Recipe
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, parameter_names, search_space
-from studio.runs.setup.initialising import InitialPose, hull_of, initialise, keep_pose, seek, whole_problem
-from studio.runs.setup.start_pose_file import start_pose_from_file
+from studio.runs.setup.initialising import (
+    UNSURE,
+    InitialPose,
+    hull_of,
+    initialise,
+    keep_pose,
+    seek,
+    whole_problem,
+)
+from studio.runs.setup.start_pose_file import keep_start_pose, start_pose_from_file
+from studio.runs.setup.workflow import StepStatus, workflow_of
 from studio.search.settings import default_settings
 from studio.search.trackers.initialisation import QUICK
 from studio.search.trackers.start_candidates import facing
@@ -115,6 +125,29 @@ def test_the_session_gets_a_start_pose_once_and_nothing_is_lost(session_on_disk:
     assert keep_pose(session, found(session, 1), replace=True) == first
     assert (session.path / "start_pose-before.csv").read_text() == "mine"
     assert (session.path / "start_pose-before-2.csv").is_file()
+
+
+def test_a_pose_of_low_confidence_is_in_doubt_until_it_is_confirmed(session_on_disk: Session) -> None:
+    session = session_on_disk
+
+    def step() -> StepStatus:
+        return next(one for one in workflow_of(session).steps if one.step == "start-pose")
+
+    keep_pose(session, found(session, 0))
+    assert (step().state, step().why) == ("done", "")
+    keep_pose(session, replace(found(session, 2), confidence=UNSURE - 0.01), replace=True)
+    assert step().words == "found in frame 2, confidence 74 %"
+    assert "It may face the other way" in step().why
+    before = sorted(session.path.glob("start_pose*"))
+    start = session.start_pose()
+    assert start is not None
+    for _ in range(2):
+        keep_start_pose(session, session.body(), start, 2)
+        assert (step().words, step().why) == ("found in frame 2, confidence 74 %, confirmed", "")
+    assert sorted(session.path.glob("start_pose*")) == before
+    start[0] += 1.0
+    keep_start_pose(session, session.body(), start)
+    assert step().words == "set by hand in frame 2"
 
 
 def test_the_start_pose_of_another_body_is_one_that_track_takes(session_on_disk: Session) -> None:

@@ -154,6 +154,15 @@ export function modelOf(setup, loaded) {
         const request = { frame: frame.value, pose: pose.value.pose, keep: true };
         await waitForRefine(await post(`${here}/pose/refine`, request));
       }),
+    /** Go on with the pose as it is: where it was in doubt, it is so no longer. */
+    confirm: () =>
+      attempt(async () => {
+        if (setup.step?.state === "done" && setup.step.why) {
+          await put(`${here}/start-pose`, { pose: pose.value.pose, frame: pose.value.frame });
+          await setup.refresh();
+        }
+        await setup.go("track", { begin: true });
+      }),
     /** @param {"turned round" | "in place"} how */
     exchange: (how) =>
       during(async () => {
@@ -268,12 +277,6 @@ function Verdict({ model }) {
         `The session has a start pose, of frame ${model.pose.value.frame}.`
       }
     </p>
-    ${
-      isDoubted &&
-      html`<p class="notice">
-        It may face the other way: check left and right before you track.
-      </p>`
-    }
     ${found?.note && html`<p class="hint">${found.note}</p>`}
   </div>`;
 }
@@ -307,7 +310,7 @@ function Mending({ model }) {
         </p>`
     }
     <div class="step-actions">
-      ${act("Yes, track all frames from here", () => model.setup.go("track", { begin: true }), "primary")}
+      ${act("Yes, track all frames from here", model.confirm, "primary")}
       ${hasSides && act("No: facing the other way", () => model.exchange("turned round"))}
       ${hasSides && act("Mirror", () => model.exchange("in place"))}
       ${act("Refine from here", model.refine)}

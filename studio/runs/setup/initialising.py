@@ -79,6 +79,8 @@ LEAST_LOSS = 1e-9
 """Of a refined pose: what has less fits exactly."""
 EVEN_SHARE, STEEPNESS = 0.1, 4.0
 """Of `trust`: the share at which right and wrong are equally likely, and the width of the transition."""
+UNSURE = 0.75
+"""A start pose with a lower confidence is to be looked at before it is tracked from: it may face the other way."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -294,8 +296,7 @@ def keep_pose(session: Session, initial: InitialPose, replace: bool = False) -> 
             keep_before(own)
             write_pose(own, initial.names, initial.pose, initial.frame)
             if initial.body == session.manifest.body:
-                words = f"found in frame {initial.frame}, confidence {100 * initial.confidence:.0f} %"
-                note(session, "start-pose", words)
+                note(session, "start-pose", initial.source, good=initial.confidence >= UNSURE)
         return own
     place = session.path / _free(f"{own.stem}-frame-{initial.frame}", taken)
     write_pose(place, initial.names, initial.pose, initial.frame)

@@ -10,12 +10,12 @@ from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.motion_files.trc import read_trc
 from studio.foundations.arrays import Array
-from studio.foundations.errors import RunError, TruthError
+from studio.foundations.errors import BodyError, RunError, TruthError
 from studio.foundations.geometry.reach import within_reach
 from studio.runs.search_space import parameter_names
 from studio.sessions.atomic_files import keep_before
 from studio.sessions.named_rows import check_radians, pose_frame, read_pose, write_pose
-from studio.sessions.provenance import note
+from studio.sessions.provenance import note, origin_of
 from studio.sessions.session import START_POSE_NAME, Session
 from studio.sessions.work_under_way import one_at_a_time
 
@@ -24,7 +24,8 @@ FEWEST_MARKERS = 4
 
 def keep_start_pose(session: Session, body: BodyModel, pose: Array, frame: int | None = None) -> Path:
     """Make a pose (D,) the session's start pose; returns the file. The old one is kept beside it as
-    start_pose-before.csv, numbered if there are more.
+    start_pose-before.csv, numbered if there are more. The pose that it has already is confirmed so: it is no longer
+    in doubt, whatever its confidence.
 
     frame : of the pose; None: that of the old one. Raises RunError for a pose of another body than the session's, or
     a frame outside the footage.
@@ -45,10 +46,22 @@ def keep_start_pose(session: Session, body: BodyModel, pose: Array, frame: int |
         )
     own = session.path / START_POSE_NAME
     with one_at_a_time(session.path):
-        keep_before(own)
-        write_pose(own, parameter_names(body), given, of)
-        note(session, "start-pose", f"set by hand in frame {of}")
+        known = origin_of(session, "start-pose") if _is_kept(session, body, given, of) else None
+        if known is None:
+            keep_before(own)
+            write_pose(own, parameter_names(body), given, of)
+        words = f"set by hand in frame {of}" if known is None else known.words
+        note(session, "start-pose", words if known is None or known.good else f"{words}, confirmed")
     return own
+
+
+def _is_kept(session: Session, body: BodyModel, pose: Array, frame: int) -> bool:
+    """Whether a pose (D,) is the session's start pose already. False where that cannot be read."""
+    try:
+        known = session.start_pose(body)
+        return known is not None and np.array_equal(known, pose) and session.start_pose_frame() == frame
+    except BodyError:
+        return False
 
 
 def frame_of_file(path: Path) -> int:

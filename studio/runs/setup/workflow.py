@@ -196,6 +196,9 @@ def subject_step(session: Session) -> StepStatus:
     return _stale(session, "subject", words, "Fitted with") or StepStatus("subject", "done", words)
 
 
+MAY_FACE_BACK = "It may face the other way: check left and right before you track."
+
+
 def start_pose_step(session: Session) -> StepStatus:
     """The pose in the first frame; optional for bodies with limits on all parameters."""
     if not (session.path / START_POSE_NAME).exists():
@@ -204,7 +207,8 @@ def start_pose_step(session: Session) -> StepStatus:
     session.start_pose()
     known = origin_of(session, "start-pose")
     words = (known.words if known else "") or "set"
-    return _stale(session, "start-pose", words, "Made with") or StepStatus("start-pose", "done", words)
+    why = MAY_FACE_BACK if known and not known.good else ""
+    return _stale(session, "start-pose", words, "Made with") or StepStatus("start-pose", "done", words, why)
 
 
 def _stale(session: Session, step: StepName, words: str, how: str) -> StepStatus | None:
