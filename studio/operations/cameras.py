@@ -250,7 +250,7 @@ def align(
     with reporting(progress, f"{opened.name}: cameras") as report:
         aligned = align_cameras(opened, frames, progress=report)
     remember_alignment(opened, aligned)
-    words, notes = alignment_words(aligned), ()
+    words, notes = alignment_words(opened, aligned), ()
     changed = keep and aligned.needed and aligned.better
     if changed:
         change = use_turned(opened, aligned)

@@ -1,7 +1,9 @@
 """Cameras turned by their silhouettes: measured, reported, stored, and undone byte for byte."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from nudged_camera import DEGREES, NUDGED, make_nudged_session, nudged, true_cameras
@@ -9,9 +11,16 @@ from nudged_camera import DEGREES, NUDGED, make_nudged_session, nudged, true_cam
 from studio.foundations.errors import CalibrationError, NotFoundError
 from studio.runs.new_run import prepare_run
 from studio.runs.setup.aligning import SessionAlignment, align_cameras
-from studio.runs.setup.turned_cameras import remember_alignment, turn_back, turn_cameras, turned_from
+from studio.runs.setup.turned_cameras import (
+    alignment_words,
+    remember_alignment,
+    turn_back,
+    turn_cameras,
+    turned_from,
+)
 from studio.runs.setup.workflow import StepStatus, workflow_of
 from studio.sessions.calibration_changes import restore_calibration, stale_runs
+from studio.sessions.manifest import write_manifest
 from studio.sessions.session import CAMERAS_PATH, Session
 
 
@@ -55,6 +64,27 @@ def test_the_way_recommends_turning_and_is_content_afterwards(
     assert apart(change.session) < 0.4 * DEGREES
     assert calibration_step(change.session).why == ""
     assert "aligned by silhouettes" in calibration_step(change.session).words
+
+
+def test_after_a_good_board_large_turns_are_proposed_only_after_the_masks(
+    session: Session, aligned: SessionAlignment
+) -> None:
+    def words(source: str, turn: float) -> str:
+        turns = np.where(aligned.aligned.turns == np.nanmax(aligned.aligned.turns), turn, 0.0)
+        measured = replace(aligned, aligned=replace(aligned.aligned, turns=turns))
+        manifest = msgspec.structs.replace(session.manifest, calibration_source=source)
+        write_manifest(session.path, manifest)
+        return alignment_words(Session(session.path), measured)
+
+    board, large = "ChArUco board 8x11, 0.48 px", "with cameras turned by up to 4.45°"
+    before, _, after = words(board, 4.45).partition(large)
+    assert f"the masks of {NUDGED}" in before
+    assert "0.48 px" in before
+    assert after
+    for source, turn in ((board, 0.6), ("chessboard 8x6, 3.20 px", 4.45), ("calibration.toml", 4.45)):
+        said = words(source, turn)
+        assert "masks" not in said
+        assert f"turned by up to {turn:.2f}°" in said
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """The report of a calibration beside its file: JSON, and a coverage picture a camera."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -57,6 +58,12 @@ def calibration_source(calibrated: Calibrated) -> str:
     kind = "ChArUco board" if board.kind == "charuco" else "chessboard"
     source = f"{kind} {board.columns}x{board.rows}"
     return f"{source}, {off:.2f} px" if math.isfinite(off) else source
+
+
+def board_error(source: str) -> float | None:
+    """The residual in pixels that an origin (`calibration_source`) names; None where it names no board or none."""
+    told = re.match(r"\w+(?: board)? \d+x\d+, (\d+\.\d+) px", source)
+    return float(told[1]) if told else None
 
 
 def write_calibrated(calibrated: Calibrated, path: Path, *, anyway: bool = False) -> tuple[Path, ...]:

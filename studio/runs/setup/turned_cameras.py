@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.footage.calibration.report import board_error
 from studio.foundations.errors import CalibrationError, NotFoundError, SessionError
 from studio.foundations.foreign_files import LARGEST_RECORD, read_file
 from studio.foundations.typed_decoding import decode_json
@@ -39,15 +40,31 @@ def remember_alignment(session: Session, aligned: SessionAlignment) -> None:
     remember(session, PART, _misses_in_words(aligned, aligned.aligned.before), not aligned.needed)
 
 
-def alignment_words(aligned: SessionAlignment) -> str:
-    """How far the silhouettes miss and the remedy, as a sentence."""
+SMALL_ERROR = 1.0
+"""Pixels: a board's calibration that leaves less is right."""
+LARGE_TURN = 1.0
+"""Degrees: cameras are not turned by more unless they were touched."""
+
+
+def alignment_words(session: Session, aligned: SessionAlignment) -> str:
+    """How far the silhouettes miss and the remedy, as a sentence. Where a board's calibration is right and the turns
+    would be large, masks are named as the likelier cause.
+    """
     angles, missed = aligned.aligned, _misses_in_words(aligned, aligned.aligned.before)
     if not aligned.needed:
         return f"{missed}: the cameras agree."
     if not aligned.better:
         return f"{missed}, and turning cameras does not explain it: check the masks and the calibration."
     turn, after = float(np.nanmax(angles.turns)), float(np.nanmax(angles.after))
-    return f"{missed}; with cameras turned by up to {turn:.2f}° they would miss by {after:.1f} px."
+    turned = f"with cameras turned by up to {turn:.2f}° they would miss by {after:.1f} px"
+    board = None if turned_from(session) else board_error(session.manifest.calibration_source)
+    if turn > LARGE_TURN and board is not None and board < SMALL_ERROR:
+        worst = aligned.names[int(np.nanargmax(angles.before))]
+        return (
+            f"{missed}, though the board's calibration is right to {board:.2f} px: look at the masks of {worst} first. "
+            f"Only where a camera was touched since: {turned}."
+        )
+    return f"{missed}; {turned}."
 
 
 def misses_in_words(session: Session) -> str:
