@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import true_poses
@@ -44,4 +44,20 @@ def test_a_start_pose_is_made_better_and_edited(browser: Browser, studio: Studio
     use.click()
     use.wait_for(state="detached")
     assert studio.get(POSE)["pose"] == pytest.approx(wanted)
+    window.close()
+
+
+def test_a_frame_that_is_typed_is_shown_with_its_masks(browser: Browser, studio: StudioServer) -> None:
+    window = StudioPage(browser, studio, with_scene=False)
+    page = window.page
+    page.goto(f"{studio.origin}/way?session=toy&step=start-pose")
+    captions = page.locator("figure.picture figcaption")
+    expect(captions.first).to_contain_text("frame 0, start pose")
+    with page.expect_request(lambda request: "/frames/3/views/" in request.url) as asked:
+        page.get_by_role("spinbutton", name="Frame").press_sequentially("3")
+    assert "show=mask" in asked.value.url
+    assert "pose=" not in asked.value.url
+    expect(captions.first).to_contain_text("frame 3, masks")
+    page.get_by_role("button", name="Show frame 0").click()
+    expect(captions.first).to_contain_text("frame 0, start pose")
     window.close()

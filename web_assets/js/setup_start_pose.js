@@ -222,7 +222,7 @@ function Make({ model }) {
         aria-label="Frame"
         value=${model.frame.value}
         disabled=${isBusy}
-        onChange=${choose}
+        onInput=${choose}
       />
     </label>
     <p class="hint">
@@ -277,7 +277,7 @@ function Verdict({ model }) {
         `The session has a start pose, of frame ${model.pose.value.frame}.`
       }
     </p>
-    ${found?.note && html`<p class="hint">${found.note}</p>`}
+    ${found?.note && html`<p class="notice">${found.note}</p>`}
   </div>`;
 }
 
@@ -339,7 +339,33 @@ export function Panel({ model }) {
   `;
 }
 
-/** The pictures of all views, or the scene while it is edited. @param {{ model: Model }} properties */
+/**
+ * A camera's picture; while another is drawn the one before it stays, and its caption says so.
+ * @param {{ name: string, frame: number, words: string, address: string }} properties
+ */
+function PosePicture({ name, frame, words, address }) {
+  const [drawn, setDrawn] = useState("");
+  const isWaiting = drawn !== address;
+  return html`<figure class=${isWaiting ? "picture redrawn" : "picture"}>
+    <img
+      alt=${`${name}, frame ${frame}${words}`}
+      loading="lazy"
+      src=${address}
+      onLoad=${() => setDrawn(address)}
+      onError=${() => setDrawn(address)}
+    />
+    <figcaption>
+      <b>${name}</b>
+      <span>${isWaiting ? `frame ${frame} is being drawn…` : `frame ${frame}${words}`}</span>
+    </figcaption>
+  </figure>`;
+}
+
+/**
+ * The pictures of all views, or the scene while it is edited. The start pose is drawn in its own
+ * frame, in others the masks in which one would be searched for.
+ * @param {{ model: Model }} properties
+ */
 export function Beside({ model }) {
   const frame = model.frame.value;
   const [pictured, setPictured] = useState(frame);
@@ -348,18 +374,20 @@ export function Beside({ model }) {
     return () => clearTimeout(wait);
   }, [frame]);
   if (model.isEditing.value) return html`<${SceneFrame} />`;
-  const isStored = Boolean(model.pose.value.stored);
-  const query = `show=outline&height=${PICTURE_HEIGHT}${isStored ? "&pose=start" : ""}&age=${model.age.value}`;
+  const { stored, frame: own } = model.pose.value;
+  const isPosed = Boolean(stored) && pictured === own;
+  const shown = isPosed ? "show=outline&pose=start" : "show=mask";
+  const query = `${shown}&height=${PICTURE_HEIGHT}&age=${model.age.value}`;
   return html`<div class="pictures">
     ${model.setup.detail.cameras.map(
-      ({ name }) => html`<figure key=${name} class="picture">
-        <img
-          alt=${`${name}, frame ${pictured}${isStored ? ", start pose" : ""}`}
-          loading="lazy"
-          src=${`${model.here}/frames/${pictured}/views/${encodeURIComponent(name)}.jpg?${query}`}
-        />
-        <figcaption><b>${name}</b></figcaption>
-      </figure>`,
+      ({ name }) =>
+        html`<${PosePicture}
+          key=${name}
+          name=${name}
+          frame=${pictured}
+          words=${isPosed ? ", start pose" : ", masks"}
+          address=${`${model.here}/frames/${pictured}/views/${encodeURIComponent(name)}.jpg?${query}`}
+        />`,
     )}
   </div>`;
 }
