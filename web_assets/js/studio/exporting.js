@@ -2,7 +2,7 @@
 
 import { fetchJson, post, remove, runPath } from "../api.js";
 import { dotted } from "../elements.js";
-import { isGoing, standing, timeLeft } from "../jobs.js";
+import { findJob, isGoing, standing, timeLeft } from "../jobs.js";
 import { onEvent } from "../live.js";
 import { complain } from "../messages.js";
 import { get, watch } from "../state.js";
@@ -28,6 +28,8 @@ const WORDS = {
   aniposelib: "anipose",
   opencv: "OpenCV",
 };
+/** What makes a better track, and its name. */
+const MAKES = { refine: "refined", smooth: "smoothed" };
 const EMPTY = { first: "first", last: "end", fps: "as tracked", height: "as recorded" };
 
 const choices = signal(/** @type {Schemas["ExportChoices"] | null} */ (null));
@@ -36,6 +38,8 @@ const listing = signal(/** @type {Schemas["ExportList"] | null} */ (null));
 const format = signal(localStorage.getItem("export-format") || "bvh");
 /** The export that is being made. */
 const going = signal(/** @type {any} */ (null));
+/** The better track of this run that is being made. */
+const making = signal(/** @type {any} */ (null));
 /** What went wrong last. */
 const failed = signal(/** @type {any} */ (null));
 let changed = /** @type {Record<string, any>} */ ({}); // options that are not at their defaults
@@ -164,12 +168,22 @@ function Actions({ form }) {
   </div>`;
 }
 
+/** What "best" does not hold yet. @param {{ list: Schemas["ExportList"] }} properties */
+const Making = ({ list }) =>
+  making.value &&
+  html`<p class="notice" role="status">
+    Track "${MAKES[making.value.verb]}" of this run is still being made
+    (${dotted(standing(making.value, "beginning"), timeLeft(making.value.seconds_left))}). Until it
+    is there, "best" is "${list.best}".
+  </p>`;
+
 /**
  * @param {{ form: any, known: Schemas["ExportChoices"], list: Schemas["ExportList"] }} properties
  */
 const Options = ({ form, known, list }) => html`<div class="export-form">
   <p class="hint">${form.opens}</p>
   ${form.takes.includes("track") && list.note && html`<p class="hint">${list.note}</p>`}
+  ${form.takes.includes("track") && html`<${Making} list=${list} />`}
   <${Actions} form=${form} />
   <div class="export-options" key=${form.name}>
     ${known.options
@@ -246,14 +260,22 @@ export function Exporting() {
   `;
 }
 
+/** Whether a job makes a better track. */
+const isMaking = (job) => job?.verb in MAKES && isGoing(job);
+
 async function refresh() {
   if (get("panel") !== "export" || !get("run")) return;
   const address = here();
   try {
     choices.value ??= await fetchJson("/api/exports/choices");
-    const found = await fetchJson(`${address}/exports`);
+    const [session, run] = [get("session"), get("run")];
+    const [found, made] = await Promise.all([
+      fetchJson(`${address}/exports`),
+      findJob({ session, kind: "track" }, (line) => line.run === run && isMaking(line)),
+    ]);
     if (address !== here()) return;
     listing.value = found;
+    making.value = isMaking(made) ? made : null;
     going.value = found.running[0] ?? null;
   } catch (error) {
     complain(error);
@@ -279,11 +301,16 @@ export function startExporting() {
     if (run !== shown) {
       shown = run;
       changed = {};
-      listing.value = going.value = failed.value = null;
+      listing.value = going.value = making.value = failed.value = null;
     }
     refresh();
   });
   onEvent("export", (job, isHere) => {
     if (isHere) hear(job);
+  });
+  onEvent("track", (job, isHere) => {
+    if (!isHere || !(job.verb in MAKES)) return;
+    if (isMaking(job)) making.value = job;
+    else refresh();
   });
 }
