@@ -2,7 +2,7 @@
 // have in common.
 
 import { sessionPath } from "./api.js";
-import { html, into, signal } from "./studio/component.js";
+import { html, into, signal, useState } from "./studio/component.js";
 
 const PICTURE_HEIGHT = 1080;
 /** @type {Record<string, [number, number]>} */
@@ -83,10 +83,20 @@ export function paintingOf(setup, lens, brush) {
     least: brush.least,
     most,
     at,
-    /** The address of a frame's picture. @param {number} frame @param {string} [show] */
-    picture: (frame, show = "") =>
-      `${sessionPath(setup.session)}/frames/${frame}/views/${encodeURIComponent(lens.name)}.jpg?` +
-      `${show}height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}`,
+    /**
+     * The address of a frame's picture; of the footage itself where it is stored upright and
+     * nothing is shown over it: what makes masks need not be ready for that.
+     * @param {number} frame
+     * @param {string} [show]
+     */
+    picture: (frame, show = "") => {
+      const here = sessionPath(setup.session);
+      const name = encodeURIComponent(lens.name);
+      const height = `height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}`;
+      return turns || show
+        ? `${here}/frames/${frame}/views/${name}.jpg?${show}${height}`
+        : `${here}/footage/${name}/${frame}.jpg?${height}`;
+    },
     /** What the canvas hears. */
     heard: {
       onPointerDown: (/** @type {PointerEvent} */ event) => {
@@ -158,12 +168,26 @@ export function Sheet({ painting, address, label, canvas, kind = "", ring, isWai
   const share = (/** @type {number} */ part, /** @type {number} */ whole) =>
     `${(100 * part) / whole}%`;
   const place = { left: share(x, width), top: share(y, height) };
+  const [seen, setSeen] = useState({ address: "", isWrong: false });
+  const isLoading = seen.address !== address;
+  const words = isLoading
+    ? "loading the picture…"
+    : seen.isWrong
+      ? "This picture cannot be read."
+      : isWaiting && "cutting the mask…";
   return html`<div class="brush-room">
     <div
       class=${isWaiting ? "brush-sheet waiting" : "brush-sheet"}
       style=${{ aspectRatio: `${width} / ${height}`, "--sheet-ratio": String(width / height) }}
     >
-      <img alt=${`Picture of ${lens.name}`} class="brush-photo" draggable=${false} src=${address} />
+      <img
+        alt=${`Picture of ${lens.name}`}
+        class="brush-photo"
+        draggable=${false}
+        src=${address}
+        onLoad=${() => setSeen({ address, isWrong: false })}
+        onError=${() => setSeen({ address, isWrong: true })}
+      />
       ${children}
       <canvas
         ref=${canvas}
@@ -179,6 +203,7 @@ export function Sheet({ painting, address, label, canvas, kind = "", ring, isWai
         class=${`brush-ring ${ring.class ?? ""}`}
         style=${{ ...place, width: share(painting.size.value, width), ...ring.style }}
       ></div>
+      <p class="brush-words" role="status">${words}</p>
     </div>
   </div>`;
 }

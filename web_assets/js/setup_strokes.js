@@ -263,7 +263,7 @@ export function Strokes(properties) {
       canvas=${canvas}
       kind="strokes-canvas"
       ring=${{ style: { borderColor: COLOURS[kind] } }}
-      isWaiting=${model.isWaiting.value}
+      isWaiting=${model.isWaiting.value && strokes.length > 0}
     >
       <img
         alt=${`Mask of ${lens.name} by the strokes`}
