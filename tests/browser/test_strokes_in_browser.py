@@ -1,12 +1,14 @@
 """Strokes painted on a camera's picture in Chromium: the mask follows, undo, another frame, kept, all masks made."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from patched_ball import SIZE, PatchedBall, patched_ball
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 from rendered_people import overlap
+from scene_wire import until
 from studio_server import StudioServer
 
 from studio.sessions.session import Session
@@ -111,3 +113,36 @@ def test_thresholds_follow_their_sliders(page: Page, studio: StudioServer) -> No
     with page.expect_request(lambda request: "mask_darkest" in request.url):
         slider.fill("90")
     assert studio.get("/api/sessions/ball/background")["source"] == "strokes"
+
+
+def test_a_picture_that_is_loaded_says_so(page: Page, studio: StudioServer) -> None:
+    page.goto(f"{studio.origin}/way?session=ball&step=background")
+    held: list[Route] = []
+    page.get_by_role("button", name="Paint strokes of cam0").wait_for()
+    page.route(re.compile(r"/footage/cam0/\d+\.jpg\?height=\d+$"), lambda route: held.append(route))
+    page.get_by_role("button", name="Paint strokes of cam0").click()
+    words = page.locator(".brush-words")
+    expect(words).to_have_text("loading the picture…")
+    until(page, lambda: bool(held))
+    for route in held:
+        route.continue_()
+    expect(words).to_have_text("")
+    assert page.locator(".brush-photo").first.evaluate("image => image.naturalWidth") > 0
+    page.unroute_all()
+    page.get_by_role("button", name="Leave").click()
+
+
+def test_the_masks_of_another_source_than_the_chosen_one_are_named(page: Page, studio: StudioServer) -> None:
+    page.goto(f"{studio.origin}/way?session=ball&step=background")
+    words = page.locator(".masks-in-use")
+    known = studio.get("/api/sessions/ball/background")
+    used = next(one["label"] for one in known["sources"] if one["name"] == known["source"])
+    other = "Combined" if used == "Median" else "Median"
+    page.get_by_role("radio", name=used).check()
+    expect(words).to_have_count(0)
+    page.get_by_role("radio", name=other).check()
+    expect(words).to_have_text(
+        f"Masks in use: {used}. {other} follows when you press “Set up the background”."
+    )
+    page.get_by_role("checkbox", name="picture alone").check()
+    expect(words).to_have_count(0)

@@ -645,6 +645,20 @@ export const Panel = ({ model }) => html`
   <${Knobs} model=${model} />
 `;
 
+/**
+ * Whose masks the pictures show, where another source is chosen and not set up yet; "" else. Only
+ * thresholds show at once.
+ * @param {Model} model
+ */
+function inUseWords({ background, source, isUnderWay }) {
+  const { source: used, sources } = background.value;
+  const chosen = source.value;
+  if (chosen === used || chosen === "threshold" || isUnderWay()) return "";
+  const labelOf = (/** @type {string} */ name) =>
+    sources.find((one) => one.name === name)?.label ?? name;
+  return `Masks in use: ${labelOf(used)}. ${labelOf(chosen)} follows when you press “Set up the background”.`;
+}
+
 /** The masks, or the editor of one. @param {{ model: Model }} properties */
 export function Beside({ model }) {
   const { Editor, ...properties } = model.painted.value ?? {};
@@ -655,5 +669,6 @@ export function Beside({ model }) {
     quality=${model.quality.value}
     exclude=${model.exclude}
     paint=${model.paint}
+    otherwise=${inUseWords(model)}
   />`;
 }

@@ -75,12 +75,14 @@ export function shownMasks(setup, count) {
 /** @typedef {Schemas["BackgroundAnswer"]["cameras"][number]} Camera */
 /**
  * @typedef {{ shown: Shown, cameras: Camera[], quality: Schemas["MaskQuality"] | null,
- *   exclude: (camera: string) => void, paint: (camera: string) => void }} MaskProperties
- *   `exclude` opens the brush for what does not count, `paint` that for strokes
+ *   exclude: (camera: string) => void, paint: (camera: string) => void, otherwise?: string }}
+ *   MaskProperties
+ *   `exclude` opens the brush for what does not count, `paint` that for strokes; `otherwise`: in
+ *   words whose masks are shown, where others were chosen
  */
 
 /** The pictures, and the bar that chooses their frame. @param {MaskProperties} properties */
-export function MaskPictures({ shown, cameras, ...more }) {
+export function MaskPictures({ shown, cameras, otherwise = "", ...more }) {
   const frame = shown.frame.value;
   const apart = Math.max(1, Math.round(shown.last / SPREAD));
   const go = (/** @type {number} */ to) => {
@@ -112,7 +114,8 @@ export function MaskPictures({ shown, cameras, ...more }) {
         picture alone
       </${Check}>
     </div>
-    ${!shown.isBare.value && html`<p class="hint">Red: the subject. Violet: it cannot be told whether it is.</p>`}
+    ${otherwise && !shown.isBare.value && html`<p class="notice masks-in-use">${otherwise}</p>`}
+    ${!shown.isBare.value && html`<p class="hint mask-words">Red: the subject. Violet: it cannot be told whether it is.</p>`}
     <div class=${shown.isCutting.value ? "pictures masks cutting" : "pictures masks"}>
       ${cameras.map(
         (camera) =>
