@@ -1,5 +1,6 @@
 """Progress, cancellation and time left of long work."""
 
+import itertools
 import math
 import time
 from collections.abc import Callable, Generator, Sequence
@@ -47,6 +48,12 @@ def heard_by(listener: Callable[..., None]) -> Generator[None]:
 
 def no_progress(_step: str, _done: int, _total: int) -> None:
     """Progress that is not shown."""
+
+
+def counting(progress: Progress, step: str, total: int) -> Callable[[], None]:
+    """To be called after each of a step's parts: reports how many of them are done."""
+    done = itertools.count(1)
+    return lambda: progress(step, next(done), total)
 
 
 def time_left(taken: Sequence[tuple[float, float]], left: float) -> float | None:

@@ -72,17 +72,17 @@ def refine_run(
     """Refine every frame of a track and store the result as another (see `runs.refined_frames`).
 
     source : "" for what was tracked, with its sides put right first (`runs.sides`) where they are not yet. progress :
-    called after each frame; where it raises, nothing is kept. Raises
+    the steps of both, called after each frame; where it raises, nothing is kept. Raises
     SessionError where `into` is taken, RunError for a run without frames, and what reading the footage raises.
     """
     knobs = settings or RefinementSettings()
     track = _begin(run, source or RAW, into, replace)
-    step, total = f"refining {run.name}", len(track.frames)
-    progress(step, 0, total)
     if not source and into != SIDES:
         with closing(ProblemSource(session, run.body(), run.cameras())) as problems:
-            correct_clip(run, problems, lambda _: progress(step, 0, total))
+            correct_clip(run, problems, progress=progress)
         track = read_track(run, best_track(run, (SIDES,)).name)
+    step, total = f"refining {run.name}", len(track.frames)
+    progress(step, 0, total)
     refined = refined_frames(session, run, track, knobs, lambda done: progress(step, done, total))
     moved = int(np.count_nonzero((refined.poses != track.poses).any(axis=1)))
     made_by = {"verb": "refine", **_origin(track), **asdict(knobs), "moved": moved}

@@ -14,6 +14,7 @@ from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress, no_progress
 from studio.runs.refined_frames import MaskSettings
 from studio.runs.run_watch import FrameSource
 from studio.runs.tracks import (
@@ -42,12 +43,16 @@ EXCHANGED = "exchanged"
 
 
 def correct_clip(
-    run: StoredRun, problems: FrameSource, read: Callable[[int], None] = lambda frame: None
+    run: StoredRun,
+    problems: FrameSource,
+    read: Callable[[int], None] = lambda frame: None,
+    progress: Progress = no_progress,
 ) -> tuple[str, ...]:
     """Look at a run as a whole and store the track "sides" if anything is corrected; returns the corrections.
 
     Live runs and runs that play their footage back and forth are skipped. An up-to-date track stays. read : called with
-    each frame read; its exception ends the work. Raises the errors of reading the footage.
+    each frame read; progress : with the step at hand. The exception of either ends the work. Raises the errors of
+    reading the footage.
     """
     if not can_be_looked_at(run):
         return ()
@@ -70,7 +75,7 @@ def correct_clip(
         ]
         fps = run.record.fps
         corrected, words = mended_clip(
-            body, cameras, track.frames, track.poses, named, fps, silhouettes_of, how
+            body, cameras, track.frames, track.poses, named, fps, silhouettes_of, how, progress
         )
     if not words:
         drop_track(run, SIDES)

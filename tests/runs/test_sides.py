@@ -50,8 +50,10 @@ def test_legs_are_corrected_once_and_the_raw_track_stays(
 ) -> None:
     raw, read = read_track(run), list[int]()
     assert notes_of(run) == run.record.notes
-    words = correct_clip(run, problems, read.append)
+    steps: list[str] = []
+    words = correct_clip(run, problems, read.append, lambda step, _done, _total: steps.append(step))
     assert words == WORDS
+    assert "comparing left and right" in steps
     assert np.array_equal(read_track(run).poses, raw.poses)
     track, body = read_track(run, "best"), run.body()
     assert track.name == "sides"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress, no_progress
 from studio.search.trackers.clip_silhouettes import SilhouettesOf
 from studio.search.trackers.limb_bridging import with_limbs_bridged
 from studio.search.trackers.refinement import RefinementSettings
@@ -24,13 +25,19 @@ def mended_clip(
     fps: float,
     silhouettes_of: SilhouettesOf,
     settings: RefinementSettings,
+    progress: Progress = no_progress,
 ) -> tuple[Array, tuple[str, ...]]:
     """The clip's poses (K, D) mended, and what was changed, a line each; other frames keep their poses.
 
     frames : (K,) ascending. poses : (K, D). named : of each frame the limbs that the tracker called lost. settings : of
-    the descents. Raises what `silhouettes_of` raises.
+    the descents. progress : the step at hand; its exception ends the work. Raises what `silhouettes_of` raises.
     """
+    progress("looking for turns", 0, 0)
     faced, turns = with_facing_right(body, cameras, frames, poses, fps, silhouettes_of, settings)
-    bridged, bridges = with_limbs_bridged(body, cameras, frames, faced, named, fps, silhouettes_of, settings)
-    corrected, changes = with_sides_right(body, cameras, frames, bridged, fps, silhouettes_of, settings)
+    bridged, bridges = with_limbs_bridged(
+        body, cameras, frames, faced, named, fps, silhouettes_of, settings, progress
+    )
+    corrected, changes = with_sides_right(
+        body, cameras, frames, bridged, fps, silhouettes_of, settings, progress
+    )
     return corrected, tuple(one.words for one in (*turns, *bridges, *changes))

@@ -12,7 +12,7 @@ with d, how far the limb's ends move from frame to frame, and σ, how far they u
 convolutional codes", 1967.)
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,7 @@ from studio.body.model import BodyModel
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array, Indices, median_and_spread, runs_of
 from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress, counting, no_progress
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
 from studio.search.trackers.frame_refinement import bent_by
@@ -70,22 +71,28 @@ def with_limbs_bridged(
     fps: float,
     silhouettes_of: SilhouettesOf,
     settings: RefinementSettings | None = None,
+    progress: Progress = no_progress,
 ) -> tuple[Array, tuple[Bridge, ...]]:
     """A tracked clip with its doubtful limbs bridged, (K, D), and what was changed; other frames keep their poses.
 
     frames : (K,) ascending. poses : (K, D). named : of each frame the limbs that the tracker called lost. settings : of
-    the descents. Raises what `silhouettes_of` raises.
+    the descents. progress : a step for each limb. Raises what `silhouettes_of` and `progress` raise.
     """
     work = _Work(body, cameras, frames, poses, fps, silhouettes_of, settings or RefinementSettings())
     for limb in dict.fromkeys(limb_names(body)):
         lost = np.array([limb in names for names in named], np.bool_)
-        for first, after in work.stretches(limb, lost):
+        stretches = work.stretches(limb, lost)
+        tries = sum(3 * (end - begin - 1) for one in stretches for begin, end in work.spans(*one))
+        work.tried = counting(progress, f"looking again for the {limb}", tries)
+        for first, after in stretches:
             work.bridge(limb, first, after)
     return work.poses, tuple(sorted(work.bridges, key=lambda bridge: (bridge.first, bridge.limb)))
 
 
 class _Work:
-    """State of the bridging of one clip."""
+    """State of the bridging of one clip. tried : called after each pose that is refined."""
+
+    tried: Callable[[], None] = staticmethod(lambda: None)
 
     def __init__(
         self,
@@ -118,19 +125,22 @@ class _Work:
                 joined.append((first, after))
         return [one for one in joined if one[1] - one[0] <= LONGEST_S * self._fps]
 
+    def spans(self, first: int, after: int) -> list[tuple[int, int]]:
+        """Rows around a stretch between which it is bridged, one pair for each two margins; none over a gap."""
+        around = [(first - before, after - 1 + behind) for before in MARGINS for behind in MARGINS]
+        return [
+            (begin, end)
+            for begin, end in around
+            if begin >= 0 and end < len(self.poses) and np.diff(self._frames[begin : end + 1]).max() <= 1
+        ]
+
     def bridge(self, limb: str, first: int, after: int) -> None:
         """Put a limb where the best path of a stretch leads, from whichever margin gains most."""
         best, most, usual = None, LEAST_GAIN, self._usual(limb)
-        for before in MARGINS:
-            for behind in MARGINS:
-                begin, end = first - before, after - 1 + behind
-                if begin < 0 or end >= len(self.poses):
-                    continue
-                if np.diff(self._frames[begin : end + 1]).max() > 1:
-                    continue
-                path, gained = self._path(limb, begin, end, usual)
-                if gained > most:
-                    best, most = (begin, path), gained
+        for begin, end in self.spans(first, after):
+            path, gained = self._path(limb, begin, end, usual)
+            if gained > most:
+                best, most = (begin, path), gained
         if best is None:
             return
         begin, path = best
@@ -186,7 +196,9 @@ class _Work:
         pose = self.poses[row].copy()
         pose[self._own[limb]] = angles
         refiner, silhouettes = self._seen(row)
-        return refiner.refine(pose, silhouettes).pose
+        refined = refiner.refine(pose, silhouettes).pose
+        self.tried()
+        return refined
 
     def _loss(self, row: int, pose: Array) -> float:
         refiner, silhouettes = self._seen(row)

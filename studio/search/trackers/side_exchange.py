@@ -38,6 +38,7 @@ from studio.body.scale import scale_of
 from studio.foundations.arrays import Array, Indices, runs_of
 from studio.foundations.errors import BodyError
 from studio.foundations.geometry.camera import Camera
+from studio.foundations.progress import Progress, counting, no_progress
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
 from studio.search.trackers.frame_refinement import has_tail
@@ -142,12 +143,15 @@ def with_sides_right(
     fps: float,
     silhouettes_of: SilhouettesOf,
     settings: RefinementSettings | None = None,
+    progress: Progress = no_progress,
 ) -> tuple[Array, tuple[Exchange, ...]]:
     """A tracked clip with its sides put right, (K, D), and what was exchanged; other frames keep their poses.
 
-    frames : (K,) ascending. poses : (K, D). settings : of the descents. Raises what `silhouettes_of` raises.
+    frames : (K,) ascending. poses : (K, D). settings : of the descents. progress : of the frames that are always
+    examined; how many are beside them is not known. Raises what `silhouettes_of` and `progress` raise.
     """
     work = _Work(body, cameras, frames, poses, fps, silhouettes_of, settings or RefinementSettings())
+    work.progress = progress
     rounds = 0
     while rounds < MOST_ROUNDS and work.put_right():
         rounds += 1
@@ -156,6 +160,8 @@ def with_sides_right(
 
 class _Work:
     """State of the correction of one clip."""
+
+    progress: Progress = staticmethod(no_progress)
 
     def __init__(
         self,
@@ -179,8 +185,11 @@ class _Work:
     def put_right(self) -> bool:
         """Apply the best path of the kind with the largest gain; False where no kind gains."""
         kinds = list(self._kinds) if len(self.frames) else []
-        for row, at in sorted((row, at) for at, kind in enumerate(kinds) for row in self._grid(kind)):
+        always = sorted((row, at) for at, kind in enumerate(kinds) for row in self._grid(kind))
+        examined = counting(self.progress, "comparing left and right", len(always))
+        for row, at in always:
             self._examine(kinds[at], row)
+            examined()
         best, most = None, 0.0
         for kind in kinds:
             backwards = BACKWARDS * self._backwards() if kind.whole else np.zeros(len(self.frames))
@@ -234,6 +243,7 @@ class _Work:
         heapq.heapify(waiting)
         while waiting:
             gain, row = heapq.heappop(waiting)
+            self.progress("comparing left and right in frames between", 0, 0)
             for beside in (row - 1, row + 1) if -gain == self._gain(kind, row) else ():
                 if not 0 <= beside < len(self.frames):
                     continue

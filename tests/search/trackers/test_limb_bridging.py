@@ -10,6 +10,7 @@ from drawn_people import drawn_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.evidence.distance_maps import SilhouetteDistances, silhouettes_by_camera
+from studio.foundations.progress import Progress, no_progress
 from studio.search.trackers.limb_bridging import Bridge, with_limbs_bridged
 
 CAMERAS = ring_of_cameras(4, 320, 240)
@@ -39,9 +40,13 @@ def shown(waving: np.ndarray) -> Shown:
 
 
 def bridged(
-    poses: np.ndarray, shown: Shown, named: Sequence[Sequence[str]] | None = None
+    poses: np.ndarray,
+    shown: Shown,
+    named: Sequence[Sequence[str]] | None = None,
+    progress: Progress = no_progress,
 ) -> tuple[np.ndarray, tuple[Bridge, ...]]:
-    return with_limbs_bridged(BODY, CAMERAS, FRAMES, poses, named or [()] * len(poses), FPS, shown)
+    lost_limbs = named or [()] * len(poses)
+    return with_limbs_bridged(BODY, CAMERAS, FRAMES, poses, lost_limbs, FPS, shown, progress=progress)
 
 
 def off(poses: np.ndarray, truth: np.ndarray) -> float:
@@ -64,7 +69,11 @@ def test_a_sound_clip_is_unchanged(waving: np.ndarray, shown: Shown) -> None:
 def test_an_arm_that_jumps_away_and_back_is_bridged(waving: np.ndarray, shown: Shown) -> None:
     planted = lost(waving)
     assert off(planted, waving) > 300.0
-    found, (bridge,) = bridged(planted, shown)
+    said: list[tuple[str, int, int]] = []
+    found, (bridge,) = bridged(planted, shown, progress=lambda *words: said.append(words))
+    assert {step for step, _, _ in said} == {"looking again for the left arm"}
+    total = said[0][2]
+    assert [done for _, done, _ in said] == list(range(1, total + 1))
     assert off(found, waving) < 40.0
     assert bridge.limb == "left arm"
     assert bridge.first == LOST.start

@@ -63,9 +63,15 @@ def off(poses: np.ndarray, truth: np.ndarray) -> float:
 
 
 def test_a_sound_clip_is_unchanged(walk: np.ndarray, shown) -> None:
-    found, changes = put_right(walk, shown)
+    said: list[tuple[str, int, int]] = []
+    found, changes = with_sides_right(
+        BODY, CAMERAS, FRAMES, walk, FPS, shown, progress=lambda *words: said.append(words)
+    )
     assert changes == ()
     assert np.array_equal(found, walk)
+    counted = [(done, total) for step, done, total in said if step == "comparing left and right"]
+    assert counted == [(done, len(counted)) for done in range(1, len(counted) + 1)]
+    assert counted
 
 
 @pytest.mark.slow
