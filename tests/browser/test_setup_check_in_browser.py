@@ -1,5 +1,5 @@
 """Steps Check and Export of the guided set-up: long notes of a track fit the page; a better track that is being made is
-named where one is exported.
+named where one is exported; what is no person is not called one.
 """
 
 import json
@@ -91,3 +91,13 @@ def test_a_better_track_that_is_being_made_is_named_where_one_is_exported(window
     page.reload()
     page.get_by_role("button", name="Export", exact=True).wait_for()
     expect(words).to_have_count(0)
+
+
+def test_what_is_no_person_is_not_called_one(window: StudioPage) -> None:
+    page = window.page
+    page.goto(f"{window.studio.origin}/way?session=toy&step=background")
+    page.get_by_text("Pictures of the empty place: 0 of").wait_for()
+    page.goto(f"{window.studio.origin}/way?session=toy&step=calibration")
+    page.locator(".rig-picture").wait_for()
+    expect(page.locator(".rig-picture .person")).to_have_count(0)
+    expect(page.locator(".rig-picture figcaption")).not_to_contain_text("person")

@@ -100,11 +100,13 @@ const Person = ({ at: [x, y], scale }) => html`
 
 /**
  * The cameras seen from above: where they look, how high they stand, the axes, a person for scale
- * where there is room for one.
+ * where one is tracked and there is room.
+ * @param {{ rig: any, isPerson: boolean }} properties
  */
-export function RigFromAbove({ rig }) {
+export function RigFromAbove({ rig, isPerson }) {
   const plan = planOf(rig);
-  const { scale, step, isRoom } = plan;
+  const { scale, step } = plan;
+  const hasScale = isPerson && plan.isRoom;
   const origin = plan.at(0, 0);
   return html`<figure class="picture rig-picture">
     <svg
@@ -114,7 +116,7 @@ export function RigFromAbove({ rig }) {
       aria-label=${`${rig.cameras.length} cameras from above`}
     >
       <${Grid} plan=${plan} />
-      ${isRoom && html`<${Person} at=${origin} scale=${scale} />`}
+      ${hasScale && html`<${Person} at=${origin} scale=${scale} />`}
       <${Axis} from=${origin} dx=${30} dy=${0} name="X" />
       <${Axis} from=${origin} dx=${0} dy=${-30} name="Y" />
       ${rig.cameras.map(
@@ -130,7 +132,7 @@ export function RigFromAbove({ rig }) {
       <b>From above</b>
       ${dotted(
         rig.floor && `Floor: ${rig.floor}`,
-        isRoom && "the shape at the origin is a person's shoulders and head",
+        hasScale && "the shape at the origin is a person's shoulders and head",
       )}
     </figcaption>
   </figure>`;

@@ -214,7 +214,7 @@ export const AddingForm = ({ model, isFirst }) => html`<details
     >
       pair frames by their times
     </${Box}>
-    <${Box} name="inverted">black is the person in the masks</${Box}>
+    <${Box} name="inverted">black is the subject in the masks</${Box}>
     ${
       !isFirst &&
       html`<${Box} name="replace" title="Cameras that are not in the new footage are removed.">

@@ -410,13 +410,12 @@ const StrokeList = ({ model }) => html`<section class="plates">
   </ul>
 </section>`;
 
-/** A camera's picture or clip of the empty room. */
-function Plate(
-  /** @type {{ camera: Background["cameras"][number], give: (files: File[]) => Promise<void> }} */ {
-    camera: { name, given, file },
-    give,
-  },
-) {
+/**
+ * A camera's picture or clip of the empty room.
+ * @param {{ camera: Background["cameras"][number], where: string,
+ *   give: (files: File[]) => Promise<void> }} properties
+ */
+function Plate({ camera: { name, given, file }, where, give }) {
   const input = useRef(/** @type {HTMLInputElement | null} */ (null));
   return html`<li>
     <span>${name}</span>
@@ -424,7 +423,7 @@ function Plate(
     <${Action}
       kind="quiet small"
       act=${() => input.current?.click()}
-      aria-label=${`Choose the empty room of ${name}`}
+      aria-label=${`Choose the empty ${where} of ${name}`}
     >
       Choose…
     </${Action}>
@@ -442,6 +441,8 @@ function Plate(
 function Plates({ model }) {
   const { cameras } = model.background.value;
   const given = cameras.filter((camera) => camera.given).length;
+  // An animal's place is a cage or a glass.
+  const where = model.setup.detail.body.by_height ? "room" : "place";
   const [isOpen, setOpen] = useState(!given && cameras.length < 3);
   const [words, setWords] = useState("");
   const give = async (
@@ -457,14 +458,14 @@ function Plates({ model }) {
     open=${isOpen}
     onToggle=${({ currentTarget }) => setOpen(currentTarget.open)}
   >
-    <summary>Pictures of the empty room: ${given} of ${cameras.length} cameras</summary>
+    <summary>Pictures of the empty ${where}: ${given} of ${cameras.length} cameras</summary>
     <label>
       One picture or clip per camera, matched by name
       <input
         type="file"
         multiple
         accept=${ANY_FOOTAGE}
-        aria-label="Pictures or clips of the empty room"
+        aria-label=${`Pictures or clips of the empty ${where}`}
         onChange=${({ target }) => give([...target.files])}
       />
     </label>
@@ -474,6 +475,7 @@ function Plates({ model }) {
           html`<${Plate}
             key=${camera.name}
             camera=${camera}
+            where=${where}
             give=${(/** @type {File[]} */ files) =>
               give(files, Object.fromEntries(files.map((file) => [camera.name, file.name])))}
           />`,

@@ -503,7 +503,7 @@ export function Beside({ model }) {
         </${Action}>`
       }
     </div>
-    ${rig.cameras.length > 0 && html`<${RigFromAbove} rig=${rig} />`}
+    ${rig.cameras.length > 0 && html`<${RigFromAbove} rig=${rig} isPerson=${model.setup.detail.body.by_height} />`}
     <div class="pictures">
       ${rig.cameras.map(
         (camera) =>

@@ -326,7 +326,10 @@ function Witness(/** @type {{ model: Model }} */ { model }) {
   </section>`;
 }
 
-/** What was corrected of a track, folded: it may be a line for every few frames. @param {{ lines: string[] }} properties */
+/**
+ * What was corrected of a track, folded: it may be a line for every few frames.
+ * @param {{ lines: string[] }} properties
+ */
 const Corrections = ({ lines }) => html`<details class="corrections">
   <summary>corrected in ${lines.length} ${lines.length === 1 ? "place" : "places"}</summary>
   <ul>

@@ -115,7 +115,12 @@ export function MaskPictures({ shown, cameras, otherwise = "", ...more }) {
       </${Check}>
     </div>
     ${otherwise && !shown.isBare.value && html`<p class="notice masks-in-use">${otherwise}</p>`}
-    ${!shown.isBare.value && html`<p class="hint mask-words">Red: the subject. Violet: it cannot be told whether it is.</p>`}
+    ${
+      !shown.isBare.value &&
+      html`<p class="hint mask-words">
+        Red: the subject. Violet: it cannot be told whether it is.
+      </p>`
+    }
     <div class=${shown.isCutting.value ? "pictures masks cutting" : "pictures masks"}>
       ${cameras.map(
         (camera) =>

@@ -197,7 +197,7 @@ function remedy(line, source) {
   const first = `Check ${line.camera} first.${below}`;
   if (BY_HAND[source]) return `${first} ${BY_HAND[source]}`;
   if (line.agreement === null)
-    return `${first} Its mask is empty: lower “mask threshold”, or give a picture of its empty room.`;
+    return `${first} Its mask is empty: lower “mask threshold”, or give a picture without the subject.`;
   if ((line.denied ?? 0) > 0.05)
     return (
       `${first} Its mask has holes that carve the subject in all views: lower “mask threshold”, ` +
