@@ -1,11 +1,16 @@
 """The guided set-up's start pose: made better from the page, edited by hand, shown in every view."""
 
+import re
+
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import true_poses
+
+from studio.sessions.provenance import note
+from studio.sessions.workspace import Workspace
 
 pytestmark = pytest.mark.browser
 
@@ -60,4 +65,23 @@ def test_a_frame_that_is_typed_is_shown_with_its_masks(browser: Browser, studio:
     expect(captions.first).to_contain_text("frame 3, masks")
     page.get_by_role("button", name="Show frame 0").click()
     expect(captions.first).to_contain_text("frame 0, start pose")
+    window.close()
+
+
+def test_a_pose_in_doubt_has_no_tick_until_it_is_tracked_from(browser: Browser, studio: StudioServer) -> None:
+    note(
+        Workspace(studio.workspace).session("toy"),
+        "start-pose",
+        "found in frame 0, confidence 3 %",
+        good=False,
+    )
+    window = StudioPage(browser, studio, with_scene=False)
+    page = window.page
+    page.goto(f"{studio.origin}/way?session=toy&step=start-pose")
+    entry = page.locator("#stepper [data-step=start-pose]")
+    expect(entry).to_have_attribute("data-doubt", "")
+    expect(page.locator(".step-head .notice")).to_contain_text("It may face the other way")
+    page.get_by_role("button", name=re.compile("^Yes, track")).click()
+    expect(entry).to_contain_text("confirmed")
+    expect(entry).not_to_have_attribute("data-doubt", "")
     window.close()

@@ -350,13 +350,13 @@ const TrackChoice = (/** @type {any} */ { model, line: { name, made_by: made } }
     />
     ${name === "raw" ? "raw (as searched)" : name}
   </label>
-  ${Array.isArray(made.exchanged) && html`<${Corrections} lines=${made.exchanged} />`}
   ${
     name === model.answer.value?.usual &&
     html`<span class="badge good" title="Step Export takes this one, unless you choose another.">
       for export
     </span>`
   }
+  ${Array.isArray(made.exchanged) && html`<${Corrections} lines=${made.exchanged} />`}
 `;
 
 /** The tracks, and what makes better ones. @param {{ model: Model }} properties */
