@@ -1,6 +1,6 @@
 """What a tracked clip shows as a whole and no frame alone: an animal that points backwards for some frames is turned
-back (`turning_back`), doubtful limbs are bridged from both ends (`limb_bridging`), and exchanged sides, left and right,
-front and back, are put right (`side_exchange`).
+back (`turning_back`), exchanged sides, left and right, front and back, are put right (`side_exchange`), and doubtful
+limbs are bridged from both ends (`limb_bridging`). Bridged first, exchanged legs are put right piece by piece.
 """
 
 from collections.abc import Sequence
@@ -34,10 +34,10 @@ def mended_clip(
     """
     progress("looking for turns", 0, 0)
     faced, turns = with_facing_right(body, cameras, frames, poses, fps, silhouettes_of, settings)
-    bridged, bridges = with_limbs_bridged(
-        body, cameras, frames, faced, named, fps, silhouettes_of, settings, progress
-    )
     corrected, changes = with_sides_right(
-        body, cameras, frames, bridged, fps, silhouettes_of, settings, progress
+        body, cameras, frames, faced, fps, silhouettes_of, settings, progress
     )
-    return corrected, tuple(one.words for one in (*turns, *bridges, *changes))
+    bridged, bridges = with_limbs_bridged(
+        body, cameras, frames, corrected, named, fps, silhouettes_of, settings, progress
+    )
+    return bridged, tuple(one.words for one in (*turns, *changes, *bridges))
