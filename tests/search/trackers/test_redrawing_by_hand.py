@@ -215,10 +215,16 @@ def test_sound_limbs_are_not_drawn_and_the_last_pose_is_tried_first(
 
 
 def recoloured_with(
-    refiner: Refiner, *, shown: float, now: tuple[float, float], then: tuple[float, float], loss: float
+    refiner: Refiner,
+    *,
+    shown: float,
+    now: tuple[float, float],
+    then: tuple[float, float],
+    loss: float,
+    explained: float = 0.93,
 ) -> tuple[bool, int]:
-    """Whether a drawn pose is taken of an arm that shows so much of itself and has such a gain and expectation, where
-    all others have such ones and such a share of its loss; and how many were drawn.
+    """Whether a drawn pose is taken of an arm that shows so much of itself, of which so much changed, and that has such
+    a gain and expectation, where all others have such ones and such a share of its loss; and how many were drawn.
     """
     pose = np.zeros(len(refiner.body.parameters))
 
@@ -236,7 +242,7 @@ def recoloured_with(
         silhouettes=(),
         hypothesis=lambda one: Hypothesis(one, 10.0 * loss, None),
     )  # fmt: skip
-    arms, began_with = {"left arm": Elsewhere(0.0, 0.97, shown)}, Hypothesis(pose, 10.0, None)
+    arms, began_with = {"left arm": Elsewhere(0.0, explained, shown)}, Hypothesis(pose, 10.0, None)
     found, drawn = frames.recoloured(np.random.default_rng(0), began_with, frame, arms, gains_of)
     return found is not began_with, drawn
 
@@ -249,6 +255,7 @@ def test_a_limb_that_shows_by_itself_is_drawn_elsewhere_only_where_colours_and_s
     assert shows(now=denied, then=confirmed, loss=0.96) == (False, 0)  # 23 more are not enough
     denied = (-90.0, 150.0)
     assert shows(now=denied, then=confirmed, loss=0.96) == (True, 4096)
+    assert shows(now=denied, then=confirmed, loss=0.96, explained=0.92) == (False, 0)
     assert shows(now=denied, then=confirmed, loss=0.98) == (False, 4096)
     assert shows(now=denied, then=(59.0, 150.0), loss=0.96) == (False, 4096)
     assert shows(now=(38.0, 150.0), then=(150.0, 150.0), loss=0.5) == (False, 0)
