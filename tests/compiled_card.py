@@ -11,8 +11,8 @@ import numba
 import numpy as np
 import pytest
 
-GENERATIONS = (8, 0), (9, 0)
-"""Of cards, by what they can do."""
+GENERATIONS = (8, 0), pytest.param((9, 0), marks=pytest.mark.slow)
+"""Of cards, by what they can do; the oldest in every run of the tests."""
 LONG, SINGLE, FLAG = numba.types.int64, numba.types.float32, numba.types.boolean
 needs_compilers = pytest.mark.skipif(
     sys.version_info >= (3, 12) or sys.platform != "linux",
