@@ -5,8 +5,10 @@ import numpy as np
 from studio.runs.search_space import default_sigma, parameter_names
 from studio.search.trackers.tracker import Estimate, FilterState, FrameResult, LayerRecord, ParticleSet
 from studio.sessions.manifest import now
+from studio.sessions.results_store import ResultsWriter
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
 
 
 def layer_of(frame: int, layer: int, *, count: int = 12, size: int = 4) -> LayerRecord:
@@ -64,3 +66,13 @@ def record_of(session: Session, name: str) -> RunRecord:
         settings={"layers": 10},
         sigma=tuple(default_sigma(body, 60.0).tolist()),
     )
+
+
+def store_run(session: Session, name: str, frames: int) -> StoredRun:
+    """A finished run of a session with so many frames of three layers each."""
+    run = session.new_run(record_of(session, name))
+    with ResultsWriter(run.folder) as writer:
+        writer.write_settings(1, 0, 0, run.record.settings)
+        for frame in range(frames):
+            writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(3)], 2000)
+    return run

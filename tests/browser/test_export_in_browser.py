@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page
-from store_records import layer_of, record_of, result_of
+from store_records import store_run
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import make_session
 
-from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
 
 pytestmark = pytest.mark.browser
@@ -22,11 +21,7 @@ FRAMES = 6
 def workspace(workspace: Path) -> Path:
     """With one tracked run."""
     session = make_session(Workspace(workspace).place_for("toy"))
-    run = session.new_run(record_of(session, "first"))
-    with ResultsWriter(run.folder) as writer:
-        writer.write_settings(1, 0, 0, run.record.settings)
-        for frame in range(FRAMES):
-            writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(3)], 2000)
+    store_run(session, "first", FRAMES)
     return workspace
 
 

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Route, expect
-from store_records import layer_of, record_of, result_of
+from store_records import store_run
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import make_session
 
 from studio.runs.sides import EXCHANGED
 from studio.runs.tracks import RAW, SIDES, SOURCE, SOURCE_DIGEST, Track, read_track, track_digest, write_track
-from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
 
 pytestmark = pytest.mark.browser
@@ -36,11 +35,7 @@ JOB = {
 def workspace(workspace: Path) -> Path:
     """With one tracked run that was corrected in many places."""
     session = make_session(Workspace(workspace).place_for("toy"))
-    run = session.new_run(record_of(session, "first"))
-    with ResultsWriter(run.folder) as writer:
-        writer.write_settings(1, 0, 0, run.record.settings)
-        for frame in range(FRAMES):
-            writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(3)], 2000)
+    run = store_run(session, "first", FRAMES)
     raw = read_track(run, RAW)
     made_by = {"verb": SIDES, SOURCE: RAW, SOURCE_DIGEST: track_digest(raw), EXCHANGED: NOTES}
     write_track(run, Track(SIDES, raw.frames, np.array(raw.poses), raw.confidence, raw.states, made_by))

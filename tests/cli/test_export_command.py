@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import answer_of, call, refusal_of
-from store_records import layer_of, record_of, result_of
+from store_records import store_run
 
 from studio.runs.tracks import Track, read_track, write_track
-from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 
 FRAMES = 6
@@ -19,11 +18,7 @@ FRAMES = 6
 @pytest.fixture
 def run(session_on_disk: Session) -> str:
     """A run of the toy session with six frames, and a derived track of three."""
-    stored = session_on_disk.new_run(record_of(session_on_disk, "first"))
-    with ResultsWriter(stored.folder) as writer:
-        writer.write_settings(1, 0, 0, stored.record.settings)
-        for frame in range(FRAMES):
-            writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(3)], 2000)
+    stored = store_run(session_on_disk, "first", FRAMES)
     short = Track("short", np.arange(3), np.zeros((3, 4)), np.full(3, np.nan), ("",) * 3, {"verb": "made"})
     write_track(stored, short)
     return "first"

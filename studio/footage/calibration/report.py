@@ -62,8 +62,8 @@ def calibration_source(calibrated: Calibrated) -> str:
 
 def board_error(source: str) -> float | None:
     """The residual in pixels that an origin (`calibration_source`) names; None where it names no board or none."""
-    told = re.match(r"\w+(?: board)? \d+x\d+, (\d+\.\d+) px", source)
-    return float(told[1]) if told else None
+    matched = re.match(r"\w+(?: board)? \d+x\d+, (\d+\.\d+) px", source)
+    return float(matched[1]) if matched else None
 
 
 def write_calibrated(calibrated: Calibrated, path: Path, *, anyway: bool = False) -> tuple[Path, ...]:
