@@ -79,7 +79,7 @@ more they must then. The loss must not grow: with 3 % more an arm is lost in 2 o
 DENIED, CONFIRMED = 0.25, 0.4
 """Shares of the expected gain. A limb that shows by itself is resampled if its colours should gain twice LEAST_GAIN
 and do not reach the first; only a pose that reaches the second is taken, with BETTER_CHAIN of the loss. Chosen on own
-start poses of *tiles*, in which an arm was wrong in two of three and stayed so (25.7 mm → 14.1)."""
+start poses of *tiles*, in one of three of which a wrong arm stayed wrong (25.7 mm → 14.7)."""
 DENIED_DRAWS, DENIED_REFINED = 4096, 16
 """Poses drawn of such a limb, which is far from where it belongs, and how many are refined."""
 REDRAWN = 0x11A6

@@ -92,8 +92,6 @@ def with_limbs_bridged(
 class _Work:
     """State of the bridging of one clip. tried : called after each pose that is refined."""
 
-    tried: Callable[[], None] = staticmethod(lambda: None)
-
     def __init__(
         self,
         body: BodyModel,
@@ -106,6 +104,7 @@ class _Work:
     ) -> None:
         self._body, self._frames, self._fps = body, frames, fps
         self.poses, self.bridges = poses.copy(), list[Bridge]()
+        self.tried: Callable[[], None] = lambda: None
         self._names = np.array(limb_names(body))
         self._seen = rows_seen(body, cameras, frames, silhouettes_of, settings)
         refiner = Refiner(body, tuple(cameras), settings)

@@ -150,8 +150,9 @@ def with_sides_right(
     frames : (K,) ascending. poses : (K, D). settings : of the descents. progress : of the frames that are always
     examined; how many are beside them is not known. Raises what `silhouettes_of` and `progress` raise.
     """
-    work = _Work(body, cameras, frames, poses, fps, silhouettes_of, settings or RefinementSettings())
-    work.progress = progress
+    work = _Work(
+        body, cameras, frames, poses, fps, silhouettes_of, settings or RefinementSettings(), progress
+    )
     rounds = 0
     while rounds < MOST_ROUNDS and work.put_right():
         rounds += 1
@@ -160,8 +161,6 @@ def with_sides_right(
 
 class _Work:
     """State of the correction of one clip."""
-
-    progress: Progress = staticmethod(no_progress)
 
     def __init__(
         self,
@@ -172,8 +171,10 @@ class _Work:
         fps: float,
         silhouettes_of: SilhouettesOf,
         settings: RefinementSettings,
+        progress: Progress = no_progress,
     ) -> None:
         self.body, self.frames, self.poses, self._fps = body, frames, poses.copy(), fps
+        self._progress = progress
         self._kinds = {
             kind: _Examined(np.full(len(frames), np.nan), poses.copy(), np.zeros(len(frames), np.bool_))
             for kind in kinds_of(body)
@@ -186,7 +187,7 @@ class _Work:
         """Apply the best path of the kind with the largest gain; False where no kind gains."""
         kinds = list(self._kinds) if len(self.frames) else []
         always = sorted((row, at) for at, kind in enumerate(kinds) for row in self._grid(kind))
-        examined = counting(self.progress, "comparing left and right", len(always))
+        examined = counting(self._progress, "comparing left and right", len(always))
         for row, at in always:
             self._examine(kinds[at], row)
             examined()
@@ -243,7 +244,7 @@ class _Work:
         heapq.heapify(waiting)
         while waiting:
             gain, row = heapq.heappop(waiting)
-            self.progress("comparing left and right in frames between", 0, 0)
+            self._progress("comparing left and right in frames between", 0, 0)
             for beside in (row - 1, row + 1) if -gain == self._gain(kind, row) else ():
                 if not 0 <= beside < len(self.frames):
                     continue

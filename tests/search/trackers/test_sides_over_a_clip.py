@@ -9,6 +9,7 @@ from moving_bodies import standing
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
+from studio.foundations.progress import no_progress
 from studio.search.trackers import side_exchange
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.refinement import RefinementSettings
@@ -42,7 +43,7 @@ def work_on(poses: Array, frames: Array | None = None, fps: float = 30.0, *kinds
         kind: _Examined(np.full(count, np.nan), poses.copy(), np.zeros(count, np.bool_))
         for kind in kinds or (PAIR,)
     }
-    work._here, work._share = {}, 1.0
+    work._here, work._share, work._progress = {}, 1.0, no_progress
     work._ends = lambda _, some: some[:, None, :3]
     return work
 
