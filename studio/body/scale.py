@@ -19,9 +19,14 @@ PERSON_MM = 1700.0
 @lru_cache(maxsize=64)
 def scale_of(body: BodyModel) -> float:
     """The longest side of a body at rest as a share of a person's, to a power of two; 1 between half and twice."""
-    if not body.drawn:
-        return 1.0
-    ends = limb_ends(body, body.neutral)[0].reshape(-1, 3)
-    longest = float(np.ptp(ends, axis=0).max())
+    longest = longest_side(body)
     octaves = math.log2(longest / PERSON_MM) if longest > 0.0 else 0.0
     return 2.0 ** round(octaves) if abs(octaves) >= 1.0 else 1.0
+
+
+def longest_side(body: BodyModel) -> float:
+    """mm along x, y or z from end to end of the limbs' axes of a body at rest; 0 for a body without limbs."""
+    if not body.drawn:
+        return 0.0
+    ends = limb_ends(body, body.neutral)[0].reshape(-1, 3)
+    return float(np.ptp(ends, axis=0).max())

@@ -33,7 +33,7 @@ OWN = (
         "--plates",
         multiple=True,
         metavar="CAMERA=FILE|FOLDER",
-        help="Pictures or clips of the empty room: one a camera, or a folder named after the cameras.",
+        help="Pictures or clips of the empty place: one a camera, or a folder named after the cameras.",
     ),
     click.option(
         "--exclude",

@@ -15,12 +15,13 @@ import numpy as np
 from annotated_types import Ge, Le
 from pydantic import Field
 
+from studio.body.scale import longest_side, scale_of
 from studio.footage.calibration.board_footage_reading import find_board_footage
 from studio.footage.calibration.coverage import coverage_picture
 from studio.footage.calibration.findings import Finding, blocking
 from studio.footage.calibration.intrinsics import Lens
 from studio.footage.calibration.report import report_of
-from studio.footage.calibration.world_picture import world_picture
+from studio.footage.calibration.world_picture import PERSON_MM, world_picture
 from studio.footage.capture.calibration_files import CALIBRATION_FORMATS, export_calibration
 from studio.footage.capture.naming import CameraMatch
 from studio.foundations.arrays import Array, Bytes
@@ -247,7 +248,18 @@ def draw_world(session: Session, proposal: Proposal, camera: str, how: WorldPict
         finally:
             footage.close()
     points: list[list[float]] = proposal.clicked.points.tolist() if proposal.clicked is not None else []
-    return world_picture(own, placed, points, how.height, bare=not how.axes)
+    return world_picture(own, placed, points, how.height, pole=pole_of(session), bare=not how.axes)
+
+
+def pole_of(session: Session) -> float:
+    """mm of the pole: a person's height beside bodies of a person's size, else the longest side of the body, to two
+    digits.
+    """
+    body = session.body()
+    if scale_of(body) == 1.0:
+        return PERSON_MM
+    longest = longest_side(body)
+    return round(longest, 1 - math.floor(math.log10(longest)))
 
 
 def draw_coverage(session: Session, proposal: Proposal, camera: str) -> bytes:

@@ -53,7 +53,7 @@ class MaskRequest:
 
     plates: Annotated[
         Mapping[str, str | Path] | None,
-        Field(description="By camera: a picture or clip of the empty room."),
+        Field(description="By camera: a picture or clip of the empty place."),
         Terminal(left_out=True),
         Web(left_out=True),
     ] = None
@@ -258,7 +258,7 @@ def _exclusion_of(session: Session, camera: str) -> Path:
 
 
 def give_plates(session: Session, plates: Mapping[str, Path], files: Iterable[Path] = ()) -> Session:
-    """The session with pictures or clips of the empty room in use; they are copied.
+    """The session with pictures or clips of the empty place in use; they are copied.
 
     plates : by camera.
     files : matched to the other cameras by their names.
@@ -280,7 +280,7 @@ def give_plates(session: Session, plates: Mapping[str, Path], files: Iterable[Pa
 class BackgroundCamera:
     """One camera.
 
-    given : which kind of picture of its empty room there is.
+    given : which kind of picture of its empty place there is.
     file : its name.
     masks : whether it has some.
     excluded : whether regions of it do not count.

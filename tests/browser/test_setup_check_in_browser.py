@@ -68,6 +68,20 @@ def test_what_was_corrected_is_folded_and_fits_the_page(window: StudioPage) -> N
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+def test_every_frame_is_looked_at(window: StudioPage) -> None:
+    """Every tenth frame is compared with the masks; one slides through all of them."""
+    page = window.page
+    page.goto(f"{window.studio.origin}/way?session=toy&step=check")
+    slider = page.get_by_label("Checked frame")
+    slider.focus()
+    for frame in range(1, FRAMES):
+        with page.expect_request(f"**/runs/first/frames/{frame}/views/*"):
+            slider.press("ArrowRight")
+        expect(slider).to_have_value(str(frame))
+    slider.press("ArrowRight")
+    expect(slider).to_have_value(str(FRAMES - 1))
+
+
 def test_a_better_track_that_is_being_made_is_named_where_one_is_exported(window: StudioPage) -> None:
     page = window.page
 

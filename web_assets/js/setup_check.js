@@ -51,28 +51,7 @@ export function modelOf(setup) {
 
   const checkOf = (/** @type {string} */ name) =>
     fetchJson(name ? `${here}/check?track=${encodeURIComponent(name)}` : `${here}/check`);
-  const everyTenth = () =>
-    Array.from(
-      { length: Math.ceil(Math.max(run.tracked_to - run.first, 1) / 10) },
-      (_, at) => run.first + 10 * at,
-    );
-  const framesToSee = () => answer.value?.check?.frames ?? everyTenth();
-
-  /** The frame that is looked at stays as long as there is something to see in it. */
-  function showAgain() {
-    const check = answer.value?.check;
-    const named = check
-      ? [
-          ...check.lost,
-          ...check.doubtful,
-          ...check.turned,
-          ...check.jumps.map((jump) => jump.frame),
-          ...Object.values(check.lost_limbs).flat(),
-        ]
-      : [];
-    const frames = framesToSee();
-    if (![...frames, ...named].includes(frame.value)) frame.value = frames[0] ?? run.first;
-  }
+  const last = Math.max(run.tracked_to - 1, run.first);
 
   async function load(wanted = "") {
     const [checked, listed] = await Promise.all([checkOf(wanted), fetchJson(`${here}/tracks`)]);
@@ -81,7 +60,6 @@ export function modelOf(setup) {
       tracks.value = listed.tracks;
       truthProblem.value = listed.truth_problem;
       track.value = checked.track;
-      showAgain();
     });
     if (listed.running[0] && !job.value) carry(listed.running[0]);
   }
@@ -136,7 +114,7 @@ export function modelOf(setup) {
     failed,
     frame,
     seen,
-    framesToSee,
+    last,
     /** Look at another track. @param {string} name */
     choose: async (name) => {
       const checked = await checkOf(name);
@@ -144,7 +122,6 @@ export function modelOf(setup) {
         track.value = name;
         seen.value = null;
         answer.value = checked;
-        showAgain();
       });
     },
     /**
@@ -427,7 +404,6 @@ export function Beside({ model }) {
       kind: inside !== null && inside < GOOD ? "bad" : "",
     };
   };
-  const frames = model.framesToSee();
   return html`<${ViewWall}
     setup=${model.setup}
     shown=${{ run: model.run.name, frame, track: model.track.value }}
@@ -435,11 +411,11 @@ export function Beside({ model }) {
   >
     <input
       type="range"
-      min="0"
-      max=${frames.length - 1}
-      value=${frames.findLastIndex((one) => one <= frame)}
+      min=${model.run.first}
+      max=${model.last}
+      value=${frame}
       aria-label="Checked frame"
-      onInput=${({ target }) => into(model.frame)(frames[Number(target.value)])}
+      onInput=${({ target }) => into(model.frame)(Number(target.value))}
     />
   </${ViewWall}>`;
 }

@@ -1,5 +1,6 @@
-"""The world drawn over a camera's picture, to see whether it is right: floor, axes, a pole of a person's height."""
+"""The world drawn over a camera's picture, to see whether it is right: floor, axes, a pole of the subject's size."""
 
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -10,11 +11,15 @@ from studio.foundations.arrays import Array, Bytes
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 
-REACH_MM, STEP_MM, AXIS_MM, POLE_MM = 2000.0, 500.0, 1000.0, 1800.0
+PERSON_MM = 1800.0
+"""Height of the pole where the subject is a person."""
+LINES, AXIS_STEPS, STEPS_A_POLE = 4, 2, 3.6
+"""Lines of the grid on each side of the origin, steps of the grid in an axis, and about how many in the pole."""
+NEAREST_SHARE = 1 / 18
+"""What lies nearer to the camera than this share of the pole is left out."""
 PIECES = 24
 RED, GREEN, BLUE, WHITE, GREY = (70, 70, 235), (90, 190, 60), (240, 130, 50), (250, 250, 250), (205, 205, 205)
 HALO = (15, 15, 15)
-NEAREST_MM = 100.0
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
@@ -24,41 +29,52 @@ def world_picture(
     points: Sequence[Sequence[float]] = (),
     height: int = 720,
     *,
+    pole: float = PERSON_MM,
     bare: bool = False,
 ) -> Bytes:
-    """(h, w, 3) BGR upright: a grid of half metres on the floor, 1 m of each axis (X red, Y green, Z blue), a pole of
-    1.8 m at the origin, and `points` (mm) with their numbers; `bare` draws nothing. picture : (H, W, 3) BGR of
-    the camera's own size.
+    """(h, w, 3) BGR upright: a grid on the floor, two of its steps of each axis (X red, Y green, Z blue), a pole at the
+    origin, and `points` (mm) with their numbers; `bare` draws nothing. picture : (H, W, 3) BGR of the camera's own
+    size. pole : mm; the grid's step follows (`grid_step`), half a metre beside a person.
     """
     across = camera.height if camera.quarter_turns % 2 == 0 else camera.width
     scale = height / across
     size = (max(1, round(camera.width * scale)), max(1, round(camera.height * scale)))
     drawn = cv2.resize(picture, size, interpolation=cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR)
-    pen = _Pen(np.array(drawn, dtype=np.uint8), camera, scale)
+    pen = _Pen(np.array(drawn, dtype=np.uint8), camera, scale, NEAREST_SHARE * pole)
     if bare:
         return np.ascontiguousarray(np.rot90(pen.picture, -camera.quarter_turns))
-    for at in np.arange(-REACH_MM, REACH_MM + 1.0, STEP_MM):
-        pen.line((at, -REACH_MM, 0.0), (at, REACH_MM, 0.0), GREY, 1)
-        pen.line((-REACH_MM, at, 0.0), (REACH_MM, at, 0.0), GREY, 1)
-    pen.line((0.0, 0.0, 0.0), (0.0, 0.0, POLE_MM), WHITE, 2)
+    step = grid_step(pole)
+    reach, long = LINES * step, AXIS_STEPS * step
+    for number in range(-LINES, LINES + 1):
+        at = number * step
+        pen.line((at, -reach, 0.0), (at, reach, 0.0), GREY, 1)
+        pen.line((-reach, at, 0.0), (reach, at, 0.0), GREY, 1)
+    pen.line((0.0, 0.0, 0.0), (0.0, 0.0, pole), WHITE, 2)
     for axis, colour in enumerate((RED, GREEN, BLUE)):
         end = np.zeros(3)
-        end[axis] = AXIS_MM
+        end[axis] = long
         pen.line((0.0, 0.0, 0.0), tuple(end), colour, 3)
     turned = np.ascontiguousarray(np.rot90(pen.picture, -camera.quarter_turns))
-    labels = [((AXIS_MM, 0, 0), "X", RED), ((0, AXIS_MM, 0), "Y", GREEN), ((0, 0, AXIS_MM), "Z", BLUE)]
-    labels += [((0.0, 0.0, POLE_MM), "1.8 m", WHITE)]
+    labels = [((long, 0, 0), "X", RED), ((0, long, 0), "Y", GREEN), ((0, 0, long), "Z", BLUE)]
+    labels += [((0.0, 0.0, pole), f"{pole / 1000:.1f} m" if pole >= 1000 else f"{pole:.0f} mm", WHITE)]
     labels += [(tuple(point), str(number), WHITE) for number, point in enumerate(points, 1)]
     for place, text, colour in labels:
         _label(turned, pen.upright(np.array(place, dtype=np.float64)), text, colour, dot=text.isdigit())
     return turned
 
 
+def grid_step(pole: float) -> float:
+    """mm between the grid's lines: about a quarter of the pole, and 1, 2 or 5 times a power of ten."""
+    wanted = pole / STEPS_A_POLE
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted * (1.0 + 1e-9))
+
+
 class _Pen:
     """Draws lines of the world on a picture; what lies behind the camera or far beside it is left out."""
 
-    def __init__(self, picture: Bytes, camera: Camera, scale: float) -> None:
-        self.picture, self._camera, self._scale = picture, camera, scale
+    def __init__(self, picture: Bytes, camera: Camera, scale: float, nearest: float) -> None:
+        self.picture, self._camera, self._scale, self._nearest = picture, camera, scale, nearest
 
     def line(
         self, start: Sequence[float], end: Sequence[float], colour: tuple[int, int, int], width: int
@@ -87,7 +103,7 @@ class _Pen:
         pixels, depth = project(self._camera, points)
         size = np.array([self._camera.width, self._camera.height])
         near = np.all(np.abs(pixels - size / 2) < 0.75 * size, axis=1)
-        return (pixels + 0.5) * self._scale - 0.5, near & (depth > NEAREST_MM)
+        return (pixels + 0.5) * self._scale - 0.5, near & (depth > self._nearest)
 
 
 def _label(

@@ -109,19 +109,19 @@ class MaskSource:
 MASK_SOURCES: dict[BackgroundSource, MaskSource] = {
     "combined": MaskSource(
         "Combined",
-        "Pictures of the empty room where there are any, the footage elsewhere; cleaned with the other views. The best "
-        "choice with three cameras or more.",
+        "Pictures of the empty place where there are any, the footage elsewhere; cleaned with the other views. The "
+        "best choice with three cameras or more.",
         "combined",
     ),
     "plate": MaskSource(
         "Picture",
-        "A picture of the empty room from each camera, unchanged.",
+        "A picture of the empty place from each camera, unchanged.",
         "gaussian",
         lacking="Give a picture for every camera below.",
     ),
     "clip": MaskSource(
         "Clip",
-        "A short video of the empty room from each camera, unchanged.",
+        "A short video of the empty place from each camera, unchanged.",
         "gaussian",
         lacking="Give a clip for every camera below.",
     ),
