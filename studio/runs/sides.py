@@ -1,12 +1,16 @@
 """Corrects a finished run as a whole (`search.trackers.clip_mending`).
 
 The tracked poses stay. If anything was corrected, the corrected poses are the track "sides", with the corrections in
-its `made_by`; otherwise there is no such track.
+its `made_by`; otherwise there is no such track, and a record of what was looked at (`LOOKED_AT`). A run is looked at
+once: who comes while another process does it waits for what that one finds.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 
+import msgspec
 import numpy as np
 
 from studio.body.model import BodyModel
@@ -18,6 +22,7 @@ from studio.foundations.progress import Progress, no_progress
 from studio.runs.refined_frames import MaskSettings
 from studio.runs.run_watch import FrameSource
 from studio.runs.tracks import (
+    FOLDER,
     RAW,
     SIDES,
     SOURCE,
@@ -35,11 +40,34 @@ from studio.search.trackers.hidden_areas import without_hidden
 from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.refinement import Distances, mm_at
 from studio.search.trackers.tracker import LIMB_LOST
+from studio.sessions.atomic_files import writing
+from studio.sessions.process_lock import ProcessLock
+from studio.sessions.record_files import RecordFile
 from studio.sessions.stored_run import StoredRun
 
 BORDER_POINTS = 150
 EXCHANGED = "exchanged"
 """Entry of `made_by`: the corrections, a line each."""
+LOOKED_AT, LOCK = "looked-at.json", "looking.lock"
+"""Files beside a run's tracks."""
+WAITING, WAIT = "waiting for the look over the whole clip that is under way", 0.2
+"""The step, and seconds between two looks whether it has ended."""
+SCHEMA_VERSION = 1
+
+
+class _LookedAt(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A run in which nothing had to be corrected. digest : of its raw track (`track_digest`), "" for none."""
+
+    schema: int = SCHEMA_VERSION
+    digest: str = ""
+
+
+_LOOKED_AT = RecordFile(
+    _LookedAt,
+    "the record of a run that was looked at as a whole",
+    "Delete the file: the run is looked at again.",
+    ("Run '{name}' was not looked at as a whole.", "'studio refine' does it."),
+)
 
 
 def correct_clip(
@@ -50,15 +78,46 @@ def correct_clip(
 ) -> tuple[str, ...]:
     """Look at a run as a whole and store the track "sides" if anything is corrected; returns the corrections.
 
-    Live runs and runs that play their footage back and forth are skipped. An up-to-date track stays. read : called with
-    each frame read; progress : with the step at hand. The exception of either ends the work. Raises the errors of
-    reading the footage.
+    Live runs and runs that play their footage back and forth are skipped. What was found before and is up to date
+    stays. read : called with each frame read; progress : with the step at hand. The exception of either ends the work.
+    Raises the errors of reading the footage.
     """
     if not can_be_looked_at(run):
         return ()
-    if known := corrections_of(run):
-        return known
-    track = read_track(run, RAW)
+    with _alone(run, progress):
+        if known := corrections_of(run):
+            return known
+        track = read_track(run, RAW)
+        looked_at = _LookedAt(digest=track_digest(track))
+        place = run.folder / FOLDER / LOOKED_AT
+        if _LOOKED_AT.read(place, _LookedAt()) == looked_at:
+            return ()
+        words = _corrected(run, track, problems, read, progress)
+        if not words:
+            drop_track(run, SIDES)
+            _LOOKED_AT.write(place, looked_at)
+        return words
+
+
+@contextmanager
+def _alone(run: StoredRun, progress: Progress) -> Generator[None]:
+    """While nobody else looks at the run; waits for who does."""
+    folder = run.folder / FOLDER
+    with writing("The track", folder):
+        folder.mkdir(exist_ok=True)
+    while (held := ProcessLock.take(folder / LOCK)) is None:
+        progress(WAITING, 0, 0)
+        time.sleep(WAIT)
+    try:
+        yield
+    finally:
+        held.free()
+
+
+def _corrected(
+    run: StoredRun, track: Track, problems: FrameSource, read: Callable[[int], None], progress: Progress
+) -> tuple[str, ...]:
+    """The corrections of a run whose raw track it is, in words; if there are any, they are stored."""
     settings = MaskSettings(run)
     evidence = partial(_look_at, problems, settings, read)
     how = descent(settings.of(run.record.first).refinement)
@@ -78,7 +137,6 @@ def correct_clip(
             body, cameras, track.frames, track.poses, named, fps, silhouettes_of, how, progress
         )
     if not words:
-        drop_track(run, SIDES)
         return ()
     changed = np.flatnonzero((corrected != track.poses).any(axis=1))
     confidence, onlooker = track.confidence.copy(), Onlooker(body, cameras)

@@ -11,12 +11,16 @@ from studio.body.forward_kinematics import marker_points
 from studio.foundations.errors import NotFoundError, RunError, SettingsError, WorkCancelledError
 from studio.runs.new_run import prepare_run
 from studio.runs.refining import jitter, refine_run, smooth_run
-from studio.runs.tracks import Track, read_track, track_names, write_track
+from studio.runs.sides import WAITING
+from studio.runs.tracks import RAW, SIDES, Track, read_track, track_digest, track_names, write_track
 from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.smoothing import SmoothingSettings
 from studio.search.trackers.tracker import LOST
+from studio.sessions.process_lock import ProcessLock
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+
+LOOKING = "looking for turns"
 
 
 @pytest.fixture
@@ -64,6 +68,57 @@ def test_frames_whose_silhouettes_do_not_agree_keep_their_pose(
     made = refine_run(session_on_disk, run, settings=settings)
     assert made.moved == 0
     assert np.array_equal(made.track.poses, read_track(run).poses)
+
+
+def test_a_clip_is_looked_at_as_a_whole_once(session_on_disk: Session, run: StoredRun) -> None:
+    steps: list[str] = []
+
+    def refine(into: str) -> list[str]:
+        steps.clear()
+        refine_run(session_on_disk, run, into=into, progress=lambda step, _done, _total: steps.append(step))
+        return steps
+
+    assert LOOKING in refine("first")
+    assert LOOKING not in refine("second")
+    raw = read_track(run)
+    looked_at = run.folder / "tracks" / "looked-at.json"
+    assert track_digest(raw) in looked_at.read_text()
+    looked_at.write_text(looked_at.read_text().replace(track_digest(raw), "of another"))
+    assert LOOKING in refine("third")
+
+
+def test_who_refines_while_the_clip_is_looked_at_waits_for_what_is_found(
+    session_on_disk: Session, run: StoredRun
+) -> None:
+    """The tracking process looks at a clip after its last frame: refining meanwhile did all of it again."""
+    (run.folder / "tracks").mkdir()
+    held = ProcessLock.take(run.folder / "tracks" / "looking.lock")
+    assert held is not None
+    steps: list[str] = []
+
+    def found(step: str, _done: int, _total: int) -> None:
+        """Another process ends its look, and corrects the second frame, while this one waits."""
+        steps.append(step)
+        if step == WAITING:
+            raw = read_track(run)
+            poses = raw.poses + 0.01 * (raw.frames == 1)[:, None]
+            made_by = {"from": RAW, "from_digest": track_digest(raw), "exchanged": ["frame 1: told"]}
+            write_track(run, dataclasses.replace(raw, name=SIDES, poses=poses, made_by=made_by))
+            held.free()
+
+    made = refine_run(session_on_disk, run, progress=found)
+    assert steps.count(WAITING) == 1
+    assert LOOKING not in steps
+    assert made.track.made_by["from"] == SIDES
+
+    def cancelled(step: str, _done: int, _total: int) -> None:
+        raise WorkCancelledError("Enough.", "")
+
+    again = ProcessLock.take(run.folder / "tracks" / "looking.lock")
+    with pytest.raises(WorkCancelledError):
+        refine_run(session_on_disk, run, into="other", progress=cancelled)
+    assert again is not None
+    again.free()
 
 
 def test_smoothing_takes_the_refined_track_else_the_raw(session_on_disk: Session, run: StoredRun) -> None:

@@ -43,14 +43,14 @@ class SideLooking:
             self._thread.submit(self._look, run)
 
     def close(self) -> None:
-        """End, at the next frame that is read."""
+        """End, at the next frame that is read or the next step."""
         self._ended.set()
         self._thread.shutdown(cancel_futures=True)
 
     def _look(self, run: OpenRun) -> None:
         try:
             with closing(ProblemSource(run.session, run.stored.body(), run.stored.cameras())) as problems:
-                words = correct_clip(run.stored, problems, self._go_on)
+                words = correct_clip(run.stored, problems, self._go_on, self._go_on)
         except WorkCancelledError:
             return
         except StudioError as error:
@@ -63,7 +63,7 @@ class SideLooking:
             if words:
                 self._say(run, "info", in_words(words))
 
-    def _go_on(self, _frame: int) -> None:
+    def _go_on(self, *_where: object) -> None:
         if self._ended.is_set():
             raise WorkCancelledError(
                 "Looking at the clip as a whole was given up.", "'studio refine' does it, too."
