@@ -115,13 +115,13 @@ def launched(kernel: Any) -> Any:  # noqa: ANN401
 
 
 if __name__ == "__main__":
-    from simulated_weighing import wait_politely
+    from threads_in_turn import take_threads_in_turn
 
     from studio.runs.tracking_run import TrackingRun, step_together
     from studio.search.trackers import device_runs, device_search, device_search_kernels
     from studio.sessions.session import Session
 
-    wait_politely()
+    take_threads_in_turn()
     device_search_kernels.SUMMING = device_search.SUMMING = 2
     device_runs.THREADS = device_search.THREADS = 8
     device_runs.record_launches = lambda launches, stream: None

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from simulated_weighing import wait_politely
+from threads_in_turn import take_threads_in_turn
 from weighting_scene import four_cameras, scattered, smooth_evidence
 
 from studio.body.catalogue import load_body
@@ -47,7 +47,7 @@ def found():
 
 
 if __name__ == "__main__":
-    wait_politely()
+    take_threads_in_turn()
     from studio.search.likelihood import device_weighing
 
     device_weighing.POSES_AT_ONCE = FEW_POSES

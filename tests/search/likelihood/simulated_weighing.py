@@ -2,10 +2,9 @@
 whose scalar helpers are plain Python then. Writes it to the file named."""
 
 import sys
-import threading
-import time
 
 import numpy as np
+from threads_in_turn import take_threads_in_turn
 from weighting_scene import four_cameras, scattered, smooth_evidence
 
 from studio.body.catalogue import load_body
@@ -57,19 +56,8 @@ def terms_of(scene, device):
     }
 
 
-def wait_politely():
-    """The simulator has a thread of Python for each of the card's, and asks without a pause whether they are done."""
-    from numba.cuda.simulator.kernel import BlockThread  # noqa: PLC0415 - where a card is simulated
-
-    def is_alive(thread):
-        time.sleep(0)
-        return threading.Thread.is_alive(thread)
-
-    BlockThread.is_alive = is_alive
-
-
 if __name__ == "__main__":
-    wait_politely()
+    take_threads_in_turn()
     from studio.search.likelihood import device_weighing, device_weighing_kernels
 
     device_weighing.POSES_AT_ONCE = FEW_POSES

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import simulated_swarm as swarms
 import simulated_tempered as made
-from simulated_weighing import wait_politely
+from threads_in_turn import take_threads_in_turn
 
 from studio.foundations.numba_on_devices import cuda
 from studio.search.trackers import (
@@ -106,7 +106,7 @@ def everything() -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    wait_politely()
+    take_threads_in_turn()
     for module in (device_search_kernels, device_search, device_swarm_kernels, device_swarm):
         module.SUMMING = 2
     device_runs.THREADS = device_search.THREADS = device_swarm.THREADS = 8

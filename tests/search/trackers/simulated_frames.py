@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from simulated_search import problem_of
-from simulated_weighing import wait_politely
+from threads_in_turn import take_threads_in_turn
 
 from studio.garden.benchmarks import card_measures
 from studio.search.trackers import (
@@ -25,7 +25,7 @@ SMALL = SwarmSettings(
 )
 
 if __name__ == "__main__":
-    wait_politely()
+    take_threads_in_turn()
     for module in (device_search_kernels, device_search, device_swarm_kernels, device_swarm):
         module.SUMMING = 2
     for module in (device_tempered_kernels, device_tempered):

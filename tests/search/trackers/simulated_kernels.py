@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from simulated_weighing import wait_politely
+from threads_in_turn import take_threads_in_turn
 
 from studio.foundations.numba_on_devices import cuda
 from studio.search.trackers import device_search_kernels, device_swarm_kernels
@@ -236,6 +236,6 @@ def everything() -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    wait_politely()
+    take_threads_in_turn()
     device_search_kernels.SUMMING = device_swarm_kernels.SUMMING = THREADS
     Path(sys.argv[1]).write_bytes(pickle.dumps(everything()))

@@ -5,7 +5,8 @@ import dataclasses
 import sys
 
 import numpy as np
-from simulated_weighing import scene_of, wait_politely
+from simulated_weighing import scene_of
+from threads_in_turn import take_threads_in_turn
 
 from studio.body.catalogue import load_body
 from studio.runs.search_space import search_space
@@ -169,7 +170,7 @@ def together(found):
 if __name__ == "__main__":
     from studio.search.trackers import device_search, device_search_kernels
 
-    wait_politely()
+    take_threads_in_turn()
     # The simulator runs a thread of the processor for each of the card's.
     device_search_kernels.SUMMING = device_search.SUMMING = 8
     device_search.THREADS = 8

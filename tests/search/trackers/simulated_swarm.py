@@ -11,7 +11,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from simulated_weighing import scene_of, wait_politely
+from simulated_weighing import scene_of
+from threads_in_turn import take_threads_in_turn
 from toy_problems import toy_space
 
 from studio.runs.search_space import search_space
@@ -251,7 +252,7 @@ def everything() -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    wait_politely()
+    take_threads_in_turn()
     device_search_kernels.SUMMING = device_swarm_kernels.SUMMING = device_swarm.SUMMING = 2
     device_runs.THREADS = device_swarm.THREADS = 8
     device_runs.record_launches = lambda launches, stream: None

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 from simulated_swarm import NumpyDevice
-from simulated_weighing import scene_of, wait_politely
+from simulated_weighing import scene_of
+from threads_in_turn import take_threads_in_turn
 from toy_problems import Bowl, toy_space
 
 from studio.runs.search_space import search_space
@@ -210,7 +211,7 @@ def everything() -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    wait_politely()
+    take_threads_in_turn()
     device_search_kernels.SUMMING = device_search.SUMMING = 2
     device_tempered_kernels.SUMMING = device_tempered.SUMMING = 2
     device_tempered_kernels.MIXING = device_tempered.MIXING = 2
