@@ -6,7 +6,7 @@ from studio.body.model import BodyModel
 from studio.cli.deriving import Call, command_of
 from studio.operations.person import Landmarks, fit_subject, initialise, landmarks, subject
 from studio.operations.subjects import subjects, together
-from studio.runs.setup.initialising import UNSURE, InitialPose
+from studio.runs.setup.initialising import InitialPose
 from studio.runs.setup.subject_fitting import FittedSubject
 
 
@@ -52,7 +52,7 @@ def fit_subject_command(call: Call) -> dict[str, object]:
 def initialise_command(call: Call) -> dict[str, object]:
     initial: InitialPose = call()
     sure = f"confidence {100.0 * initial.confidence:.0f} %"
-    if initial.confidence < UNSURE:
+    if initial.unsure:
         sure += ", look at it before you track: it may face the other way"
     kept = f"written to {initial.file.name}" if initial.file else "found, and not written"
     return {

@@ -8,7 +8,7 @@ import { complain } from "./messages.js";
 import { SceneFrame } from "./setup_views.js";
 import { attempting, html, into, signal, useEffect, useState } from "./studio/component.js";
 import { Action, Failure, Progress } from "./studio/parts.js";
-import { foundWords, isUnsure } from "./studio/start_pose.js";
+import { foundWords } from "./studio/start_pose.js";
 
 const PICTURE_HEIGHT = 360;
 const REDRAW_MILLISECONDS = 250;
@@ -269,9 +269,8 @@ function Verdict({ model }) {
         ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.`
         : "The search found no better pose near it."),
   ];
-  const isDoubted = found && isUnsure(found);
   return html`<div class="start-pose-verdict">
-    <p class=${isDoubted ? "notice" : ""}>
+    <p class=${found?.unsure ? "notice" : ""}>
       ${
         words.filter(Boolean).join(" ") ||
         `The session has a start pose, of frame ${model.pose.value.frame}.`

@@ -107,7 +107,8 @@ SESSION = "/sessions/{session}"
 class InitialisationState(NumberedJob):
     """How the search stands.
 
-    pose: radians and mm, in the order of `parameters`. confidence: 0 to 1, that the body stands so and faces so.
+    pose: radians and mm, in the order of `parameters`. confidence: 0 to 1, that the body stands so and faces so;
+    unsure: it is so low that the pose is to be looked at before it is tracked from.
     margin: log weight by which the best pose that faces the other way is beaten, null without one. overlap: of the
     silhouettes. file: that it was written to, in the session's folder.
     """
@@ -117,6 +118,7 @@ class InitialisationState(NumberedJob):
     parameters: list[str] = Field(default_factory=list)
     pose: Numbers | None = None
     confidence: Number = None
+    unsure: bool = False
     margin: Number = None
     overlap: Number = None
     source: str = ""

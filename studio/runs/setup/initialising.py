@@ -121,6 +121,11 @@ class InitialPose:
         """The origin of the pose, for a run's record."""
         return f"found in frame {self.frame}, confidence {100.0 * self.confidence:.0f} %"
 
+    @property
+    def unsure(self) -> bool:
+        """Whether it is to be looked at before it is tracked from."""
+        return self.confidence < UNSURE
+
 
 def initialise(
     session: Session,
@@ -296,7 +301,7 @@ def keep_pose(session: Session, initial: InitialPose, replace: bool = False) -> 
             keep_before(own)
             write_pose(own, initial.names, initial.pose, initial.frame)
             if initial.body == session.manifest.body:
-                note(session, "start-pose", initial.source, good=initial.confidence >= UNSURE)
+                note(session, "start-pose", initial.source, good=not initial.unsure)
         return own
     place = session.path / _free(f"{own.stem}-frame-{initial.frame}", taken)
     write_pose(place, initial.names, initial.pose, initial.frame)

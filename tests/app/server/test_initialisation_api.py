@@ -20,13 +20,13 @@ Tell = Callable[[str, int, int], None]
 
 
 def found_in(session: Session, frame: int, body: BodyModel) -> InitialPose:
-    """A pose that somebody found."""
+    """A pose that somebody found; in frame 1 it is doubtful."""
     return InitialPose(
         frame=frame,
         body=body.name,
         names=parameter_names(body),
         pose=body.neutral + 0.25,
-        confidence=0.9,
+        confidence=0.5 if frame == 1 else 0.9,
         margin=float("inf"),
         rival=None,
         agreement=1.0,
@@ -64,6 +64,7 @@ def test_what_is_found_is_reported_kept_and_shown(studio: Studio, session: Sessi
     neutral = session.body().neutral
     assert np.allclose(response["pose"], neutral + 0.25)
     assert (response["confidence"], response["margin"], response["overlap"]) == (0.9, None, None)
+    assert response["unsure"] is False
     assert (response["done"], response["total"], response["note"]) == (3, 10, "a note")
     assert response["file"] == "start_pose-frame-2.csv"
     assert (session.path / response["file"]).is_file()
@@ -75,6 +76,12 @@ def test_what_is_found_is_reported_kept_and_shown(studio: Studio, session: Sessi
     assert np.allclose(pose, neutral + 0.25)
     assert "90 %" in str(shown[0][3])
     assert shown[0][4] == 2
+
+
+def test_a_doubtful_pose_is_called_so(studio: Studio, quick: dict) -> None:
+    answer = studio.post("/api/sessions/take1/initialise", {"frame": 1}, code=202)
+    response = studio.ended(f"/api/initialisations/{answer['identifier']}")
+    assert (response["confidence"], response["unsure"]) == (0.5, True)
 
 
 def test_replacing_keeps_the_old_pose_beside_the_new_one(

@@ -8,8 +8,6 @@ import { say } from "../messages.js";
 import { openSession, refreshSessions } from "../sessions.js";
 import { openForm, whileOpen } from "./dialogs.js";
 
-const UNSURE = 0.75;
-
 /**
  * Look for the pose in a frame; resolves with what was found, throws what went wrong.
  * @param {string} session
@@ -26,9 +24,6 @@ export async function findStartPose(session, request, report) {
   );
 }
 
-/** Whether a pose that was found may be wrong. */
-export const isUnsure = (found) => found.confidence < UNSURE;
-
 /**
  * How sure a pose is, and how much of the masks it covers: two numbers that say different things.
  */
@@ -39,11 +34,10 @@ export function foundWords({ confidence, overlap }) {
 
 /** Say what was found, as a warning where it may be wrong. */
 export function sayFound(found) {
-  const unsure = isUnsure(found);
   const doubt = "Check it in the scene before you track: it may face the other way.";
   say(`Start pose found in frame ${found.frame}: ${foundWords(found)}; kept in ${found.file}.`, {
-    kind: unsure ? "warning" : "info",
-    remedy: [unsure && doubt, found.note].filter(Boolean).join(" "),
+    kind: found.unsure ? "warning" : "info",
+    remedy: [found.unsure && doubt, found.note].filter(Boolean).join(" "),
   });
 }
 
