@@ -25,5 +25,6 @@ def test_a_height_gives_published_lengths_and_that_height(name: str) -> None:
         for side in ("left", "right"):
             assert body.dimensions[f"{side}_{part}"] == pytest.approx(share * 1800.0, abs=0.1)
     assert body.dimensions["ankle_height"] == pytest.approx(0.039 * 1800.0)
-    assert limb_ends(body, body.neutral)[0, ..., 2].max() == pytest.approx(1800.0, abs=1.0)
+    # Within what a head that leans back lacks: 288 mm times 1 - cos 6 degrees.
+    assert limb_ends(body, body.neutral)[0, ..., 2].max() == pytest.approx(1800.0, abs=1.6)
     assert "Drillis & Contini 1966" in body.definition.source
