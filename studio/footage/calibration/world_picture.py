@@ -18,6 +18,8 @@ LINES, AXIS_STEPS, STEPS_A_POLE = 4, 2, 3.6
 NEAREST_SHARE = 1 / 18
 """What lies nearer to the camera than this share of the pole is left out."""
 PIECES = 24
+FINE = 4
+"""Binary digits of a pixel in which ends of lines are given."""
 RED, GREEN, BLUE, WHITE, GREY = (70, 70, 235), (90, 190, 60), (240, 130, 50), (250, 250, 250), (205, 205, 205)
 HALO = (15, 15, 15)
 FONT = cv2.FONT_HERSHEY_SIMPLEX
@@ -82,11 +84,11 @@ class _Pen:
         share = np.linspace(0.0, 1.0, PIECES)[:, None]
         points = (1.0 - share) * np.array(start) + share * np.array(end)
         pixels, seen = self._pixels(points)
-        whole = np.where(seen[:, None], pixels, 0.0).round().astype(int).tolist()
+        fine = (np.where(seen[:, None], pixels, 0.0) * 2**FINE).round().astype(int).tolist()
         pieces = [pair for pair in range(PIECES - 1) if seen[pair] and seen[pair + 1]]
         for shade, wide in ((HALO, width + 2), (colour, width))[width == 1 :]:
             for first in pieces:
-                cv2.line(self.picture, whole[first], whole[first + 1], shade, wide, cv2.LINE_AA)
+                cv2.line(self.picture, fine[first], fine[first + 1], shade, wide, cv2.LINE_AA, FINE)
 
     def upright(self, point: Array) -> tuple[int, int] | None:
         """Where a point lies in the upright picture, None if it is not seen."""
