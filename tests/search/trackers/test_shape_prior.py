@@ -60,3 +60,22 @@ def test_a_wrong_reported_height_is_overruled(space: ShapeSpace) -> None:
     cost = bare.log(away) - prior.log(away)
     assert cost[0] < 0.05
     assert cost[3] - cost[2] < 0.7 * (cost[1] - cost[0])
+
+
+def test_flesh_off_the_bone_meets_a_wall_three_spreads_away() -> None:
+    space = shape_space(load_body("human35"), lengths=False, radii=False, flesh=True)
+    prior = ShapePrior(space, SPREADS, None)
+    for name in ("head_forward", "pelvis_forward"):
+        along = (np.array(space.names) == name).astype(float)
+        costs = -2.0 * prior.log(np.outer([2.0, 3.0, -3.0, 3.2, -4.0], prior.sigma * along))
+        np.testing.assert_allclose(costs, [4.0, 9.0, 9.0, 3.2**2 + 25.0 * 0.04, 16.0 + 25.0])
+        beyond = -3.5 * prior.sigma * along
+        loss, gradient, matrix = prior.equations(beyond)
+        assert loss == pytest.approx(-2.0 * prior.log(beyond[None])[0])
+        step = 1e-6 * along
+        slope = float(np.diff(-prior.log(np.stack([beyond - step, beyond + step])))[0]) / 2e-6
+        assert gradient @ along == pytest.approx(slope, rel=1e-5)
+        assert along @ matrix @ along == pytest.approx(26.0 / (prior.sigma @ along) ** 2)
+    # Ratios, such as a head's breadth, have none.
+    ratio = np.array([group.kind == "ratio" for group in space.groups]) / np.sqrt(3.0)
+    assert -2.0 * prior.log((4.0 * prior.sigma * ratio)[None])[0] == pytest.approx(16.0)
