@@ -48,6 +48,9 @@ def test_every_experiment_can_be_planned_and_kept(name: str) -> None:
     assert 0 < len(quick.jobs) <= len(full.jobs)
     assert len(each_once([full])) == len(full.jobs), "two trials of one experiment are the same"
     assert len({job.label for job in full.jobs}) == len(full.jobs), "two trials have the same label"
+    if name != "shadow-test":  # which draws its pictures itself
+        for job in full.jobs:
+            assert opened(job.arguments) <= set(job.footage), "a trial's footage would not be rendered"
     for job in quick.jobs:
         if name.startswith("deutscher-") and experiment.footage:
             # A preview renders less than a second of each footage.
@@ -55,6 +58,14 @@ def test_every_experiment_can_be_planned_and_kept(name: str) -> None:
             assert 1 <= job.frames <= 48
         assert plain(job.arguments) == job.arguments
         assert pickle.loads(pickle.dumps(job)) == job
+
+
+def opened(arguments: object) -> set[str]:
+    """The recipes whose sessions a trial opens."""
+    if not isinstance(arguments, dict):
+        return set()
+    own = {arguments.get(key) for key in ("clip", "footage")} & set(recipe_names())
+    return own.union(*(opened(value) for value in arguments.values()))
 
 
 def test_only_used_frames_are_needed(tmp_path) -> None:

@@ -289,4 +289,12 @@ def _words(counts: Counts, column: int) -> str:
     return f"{counts[column]} / {counts[column + 1]} / {counts[0]}" if counts[0] else "–"
 
 
-EXPERIMENTS = (listed("planted-losses", trials, measure, shown),)
+EXPERIMENTS = (
+    listed(
+        "planted-losses",
+        trials,
+        measure,
+        shown,
+        footage=tuple(clip_name(CHOOSING, kind) for kind in KINDS),
+    ),
+)
