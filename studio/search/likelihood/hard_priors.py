@@ -21,7 +21,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.forward_kinematics import checked_poses, limb_frames
+from studio.body.forward_kinematics import checked_poses, joint_frames, limb_frames
 from studio.body.model import BodyModel, joints_above, kinematic_tables, moving_joint
 from studio.foundations.arrays import Array, Floats
 from studio.foundations.errors import BodyError
@@ -37,6 +37,8 @@ TRUNK_SHARE = 0.5
 NEUTRAL_SHARE = 0.75
 # A least share below which a pair is not compared at all.
 NOTHING_LEFT = 0.02
+# Bones that begin nearer to each other than so many mm begin at one place.
+SAME_PLACE = 1e-6
 # About half a millisecond of ten limbs.
 BLOCKS_A_THREAD = 60
 
@@ -110,7 +112,11 @@ def limb_pairs(body: BodyModel) -> LimbPairs:
     solid = np.array([limb.part != "" for limb in body.drawn])
     default = np.where(solid[candidates.limbs].any(axis=1), TRUNK_SHARE, LIMB_SHARE)
     least = np.minimum(default, NEUTRAL_SHARE * at_rest).astype(np.float32)
-    compared = least > NOTHING_LEFT
+    bones = [max(moving_joint(body, limb.joint), 0) for limb in body.drawn]
+    origins = joint_frames(body, body.neutral)[0, bones, :, 3][candidates.limbs]
+    # Collar-bones and head begin at the base of the neck and overlap there, though flesh lies beside the bone.
+    at_one_place = np.linalg.norm(origins[:, 0] - origins[:, 1], axis=1) < SAME_PLACE
+    compared = (least > NOTHING_LEFT) & ~(at_one_place & (NEUTRAL_SHARE * at_rest < default))
     return LimbPairs(program, candidates.limbs[compared], least[compared])
 
 
