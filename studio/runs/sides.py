@@ -5,9 +5,7 @@ its `made_by`; otherwise there is no such track, and a record of what was looked
 once: who comes while another process does it waits for what that one finds.
 """
 
-import time
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import msgspec
@@ -41,7 +39,7 @@ from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.refinement import Distances, mm_at
 from studio.search.trackers.tracker import LIMB_LOST
 from studio.sessions.atomic_files import writing
-from studio.sessions.process_lock import ProcessLock
+from studio.sessions.process_lock import alone
 from studio.sessions.record_files import RecordFile
 from studio.sessions.stored_run import StoredRun
 
@@ -50,8 +48,8 @@ EXCHANGED = "exchanged"
 """Entry of `made_by`: the corrections, a line each."""
 LOOKED_AT, LOCK = "looked-at.json", "looking.lock"
 """Files beside a run's tracks."""
-WAITING, WAIT = "waiting for the look over the whole clip that is under way", 0.2
-"""The step, and seconds between two looks whether it has ended."""
+WAITING = "waiting for the look over the whole clip that is under way"
+"""The step."""
 SCHEMA_VERSION = 1
 
 
@@ -84,12 +82,15 @@ def correct_clip(
     """
     if not can_be_looked_at(run):
         return ()
-    with _alone(run, progress):
+    folder = run.folder / FOLDER
+    with writing("The track", folder):
+        folder.mkdir(exist_ok=True)
+    with alone(folder / LOCK, lambda: progress(WAITING, 0, 0)):
         if known := corrections_of(run):
             return known
         track = read_track(run, RAW)
         looked_at = _LookedAt(digest=track_digest(track))
-        place = run.folder / FOLDER / LOOKED_AT
+        place = folder / LOOKED_AT
         if _LOOKED_AT.read(place, _LookedAt()) == looked_at:
             return ()
         words = _corrected(run, track, problems, read, progress)
@@ -97,21 +98,6 @@ def correct_clip(
             drop_track(run, SIDES)
             _LOOKED_AT.write(place, looked_at)
         return words
-
-
-@contextmanager
-def _alone(run: StoredRun, progress: Progress) -> Generator[None]:
-    """While nobody else looks at the run; waits for who does."""
-    folder = run.folder / FOLDER
-    with writing("The track", folder):
-        folder.mkdir(exist_ok=True)
-    while (held := ProcessLock.take(folder / LOCK)) is None:
-        progress(WAITING, 0, 0)
-        time.sleep(WAIT)
-    try:
-        yield
-    finally:
-        held.free()
 
 
 def _corrected(

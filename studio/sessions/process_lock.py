@@ -1,12 +1,17 @@
 """A lock on a folder that the system frees when its process dies, on every system alike."""
 
 import sqlite3
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from studio.sessions.atomic_files import unwritable
 from studio.sessions.session_databases import open_database
 
+WAIT = 0.2
+"""Seconds between two looks whether a lock is free."""
 HELD = frozenset((sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED))
 
 
@@ -52,6 +57,21 @@ class ProcessLock:
 
     def free(self) -> None:
         self.connection.close()
+
+
+@contextmanager
+def alone(path: Path, waiting: Callable[[], None] = lambda: None) -> Generator[None]:
+    """While no other process has the lock of the file `path`; waits for it as long as that takes.
+
+    waiting : called before each pause, and may raise to end it. Raises SessionError as `ProcessLock.take`.
+    """
+    while (held := ProcessLock.take(path)) is None:
+        waiting()
+        time.sleep(WAIT)
+    try:
+        yield
+    finally:
+        held.free()
 
 
 def _begin(path: Path, patience: float, *statements: str) -> ProcessLock | None:

@@ -15,7 +15,6 @@ import hashlib
 import json
 import os
 import threading
-import time
 from collections import OrderedDict
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
@@ -43,7 +42,7 @@ from studio.sessions.file_checksums import check_files
 from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.names import checked_name, free_name, name_from
 from studio.sessions.object_stores import Listed, Store, above, below, is_address
-from studio.sessions.process_lock import ProcessLock
+from studio.sessions.process_lock import ProcessLock, alone
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
 from studio.sessions.run_record import FILE_NAME as RUN_RECORD
 from studio.sessions.session import RUNS_NAME, Session
@@ -55,7 +54,7 @@ ORIGIN_NAME, IN_USE_NAME = "origin.json", "in-use.lock"
 COMPARISONS, COMPARISON_RECORD = "comparisons", "comparison.json"
 NOT_BROUGHT = (f"{RUNS_NAME}/", f"{COMPARISONS}/")
 """What a copy begins without; a run or a comparison comes when it is wanted."""
-TRIES, WAIT, PATIENCE = 3, 0.2, 30.0
+TRIES, PATIENCE = 3, 30.0
 HELD_AT_MOST = 16
 """Copies that a process keeps from being removed: those that it opened last."""
 
@@ -350,7 +349,7 @@ def _bring(store: Store, files: Mapping[str, Listed], key: str, name: str, progr
     cache = cache_folder()
     with writing("The copy", cache):
         cache.mkdir(parents=True, exist_ok=True)
-    with _alone(cache / f"{key}.lock"):
+    with alone(cache / f"{key}.lock"):
         place, partial = cache / key, cache / f"{PARTIAL_PREFIX}{key}"
         if (place / name / MANIFEST).is_file():
             return
@@ -387,17 +386,6 @@ def _bring_checked(store: Store, files: Mapping[str, Listed], folder: Path, prog
             f"'{below(store.address, name)}' {what}.",
             "Delete the session there and upload it again completely.",
         )
-
-
-@contextmanager
-def _alone(lock: Path) -> Generator[None]:
-    """While no other process has the lock; waits for it as long as that takes."""
-    while (held := ProcessLock.take(lock)) is None:
-        time.sleep(WAIT)
-    try:
-        yield
-    finally:
-        held.free()
 
 
 _holds: "OrderedDict[Path, ProcessLock]" = OrderedDict()

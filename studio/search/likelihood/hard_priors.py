@@ -111,12 +111,13 @@ def limb_pairs(body: BodyModel) -> LimbPairs:
     at_rest = candidates.shares(checked_poses(body, body.neutral))[0]
     solid = np.array([limb.part != "" for limb in body.drawn])
     default = np.where(solid[candidates.limbs].any(axis=1), TRUNK_SHARE, LIMB_SHARE)
-    least = np.minimum(default, NEUTRAL_SHARE * at_rest).astype(np.float32)
+    usual = NEUTRAL_SHARE * at_rest
+    least = np.minimum(default, usual).astype(np.float32)
     bones = [max(moving_joint(body, limb.joint), 0) for limb in body.drawn]
     origins = joint_frames(body, body.neutral)[0, bones, :, 3][candidates.limbs]
     # Collar-bones and head begin at the base of the neck and overlap there, though flesh lies beside the bone.
     at_one_place = np.linalg.norm(origins[:, 0] - origins[:, 1], axis=1) < SAME_PLACE
-    compared = (least > NOTHING_LEFT) & ~(at_one_place & (NEUTRAL_SHARE * at_rest < default))
+    compared = (least > NOTHING_LEFT) & ~(at_one_place & (usual < default))
     return LimbPairs(program, candidates.limbs[compared], least[compared])
 
 
