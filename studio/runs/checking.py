@@ -6,7 +6,7 @@ limbs (`jumps`), limbs contradicted by the masks (`search.trackers.agreement`), 
 """
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -18,7 +18,8 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
-from studio.foundations.arrays import Array
+from studio.footage.capture.footage import Footage
+from studio.foundations.arrays import Array, Bytes
 from studio.foundations.errors import RunError, SessionError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress, no_progress
@@ -27,6 +28,7 @@ from studio.runs.drawing.overlay_drawing import projected_silhouette
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.refining import jitter
 from studio.runs.run_footage import filmed_cameras, footage_of
+from studio.runs.setup.person_witness import LimbsByNetwork, missed
 from studio.runs.tracks import BEST, Track, read_track, track_stamp
 from studio.search.likelihood.overlay import limb_contours
 from studio.search.settings import RunSettings, settings_from_values
@@ -63,8 +65,9 @@ NAMED = 4
 
 
 class ContradictedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A limb contradicted by a frame. share : of its area that disagrees with the masks. elsewhere : what changed in
-    the pictures contradicts it (`search.trackers.limbs_elsewhere`), though the masks may not.
+    """A limb contradicted by a frame. share : of its area that disagrees with the masks. elsewhere : the pictures
+    contradict it, though the masks may not: what changed in them (`search.trackers.limbs_elsewhere`), or where a
+    network sees a person's limbs (`setup.person_witness`).
     """
 
     frame: int
@@ -197,7 +200,7 @@ def check_run(
         known = set(results.frames())
         backgrounds, knobs = Backgrounds(footage), settings.evidence
         maker = EvidenceMaker(cameras, footage, backgrounds, knobs, "none")
-        witness = LimbsElsewhere(body, cameras)
+        witness, network = LimbsElsewhere(body, cameras), LimbsByNetwork(body, cameras)
         for done, row in enumerate(rows):
             progress("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))
@@ -210,7 +213,8 @@ def check_run(
                 if witness.usable:
                     elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
                 off = without_sure(off, elsewhere)
-                contradicted += _with_elsewhere(frame, off.shares(), lost_of(elsewhere))
+                seen = network.lost(pose, _pictures(footage, cameras, frame)) if network.usable else {}
+                contradicted += _with_elsewhere(frame, off.shares(), {*lost_of(elsewhere), *missed(seen, elsewhere)})
     check = RunCheck(
         track=chosen.name,
         stamp=track_stamp(run, chosen.name),
@@ -278,8 +282,15 @@ def _contradicted(
     return agreement.of(pose, seen)
 
 
-def _with_elsewhere(frame: int, off: Mapping[str, float], lost: Sequence[str]) -> list[ContradictedLimb]:
-    """The limbs that masks or pictures contradict. off : as of `_contradicted`. lost : of `LimbsElsewhere`."""
+def _pictures(footage: Footage, cameras: Sequence[Camera], frame: int) -> dict[str, Bytes]:
+    absent = footage.absent(frame)
+    return {one.name: footage.picture(one.name, frame) for one in cameras if one.name not in absent}
+
+
+def _with_elsewhere(frame: int, off: Mapping[str, float], lost: Collection[str]) -> list[ContradictedLimb]:
+    """The limbs that masks or pictures contradict. off : as of `_contradicted`. lost : of `LimbsElsewhere` and
+    `LimbsByNetwork`.
+    """
     return [
         ContradictedLimb(frame, limb, round(share, 3), limb in lost)
         for limb, share in off.items()

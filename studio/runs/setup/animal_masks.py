@@ -75,7 +75,10 @@ of a pixel."""
 SHAKEN = 1.0
 """Pixels by which a camera may have moved since its background was taken: so much of an edge there is no limb."""
 SELDOM, CHANGED = 15.0, 10.0
-"""Percent of the frames in which a background is seen where it is right, and grey levels by which it is off else."""
+"""Percent of the frames in which a background is seen where something passes, and grey levels by which it is off if it
+is wrong."""
+EMPTY = 0.25
+"""Share of the frames in which an animal that sits where the background shows one is elsewhere."""
 RIM = 2.0
 """Pixels beyond the hull within which a mask is confirmed."""
 HOLE = 150.0
@@ -205,9 +208,14 @@ def without_ghosts(background: Bytes, pictures: Sequence[Bytes]) -> Bytes:
     passing = (often > 2.0 * CHANGED) & (seldom < CHANGED)
     extreme = np.take_along_axis(brighter, np.abs(brighter).argmax(axis=0)[None], axis=0)[0]
     sign = np.sign(np.median(extreme[passing])) if passing.any() else 0.0
-    wrong = (seldom > CHANGED) & (np.sign(np.median(brighter, axis=0)) == -sign)
-    grown = cv2.dilate(_opened(np.where(wrong, np.uint8(255), np.uint8(0)), 1.0, 1.0), disc(2))
-    return np.where(grown[..., None] > 0, np.median(stack, axis=0).astype(np.uint8), background)
+    by_brightness = np.argsort(sign * brighter, axis=0)[round(EMPTY * (len(stack) - 1))][None]
+    empty = np.take_along_axis(stack, by_brightness[..., None], axis=0)[0]
+    wrong = sign * np.take_along_axis(brighter, by_brightness, axis=0)[0] < -CHANGED
+    # A tail that lies still is brighter than the floor and no ghost of a dark animal: thin pieces stay.
+    unit = float(np.sqrt(np.median(np.count_nonzero(away > 2.0 * CHANGED, axis=(1, 2))))) / SUBJECT_SIDE
+    pieces = _opened(np.where(wrong, np.uint8(255), np.uint8(0)), 1.0, 1.0)
+    grown = cv2.dilate(_touching(pieces, _opened(pieces, THIN, unit)), disc(2))
+    return np.where(grown[..., None] > 0, empty, background)
 
 
 def darkest_shadow(shares: Floats) -> float:

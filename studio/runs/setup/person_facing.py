@@ -16,7 +16,7 @@ import numpy as np
 
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
-from studio.evidence.person_network import FOUND, Crop, PersonNetwork
+from studio.evidence.person_network import FOUND, Crop, Detection, PersonNetwork
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
@@ -41,24 +41,38 @@ def facing_agreement(
     if any(name not in numbers for left, right, *_ in SIDES for name in (left, right)):
         return 0.0
     joints = joint_frames(body, pose)[0, :, :, 3]
-    network, along, length = PersonNetwork(), 0.0, 0.0
+    seen, along, length = person_around(PersonNetwork(), cameras, pictures, joints), 0.0, 0.0
+    for camera in cameras:
+        if camera.name not in seen:
+            continue
+        one, pixels = seen[camera.name], project(camera, joints)[0]
+        for left, right, shown_left, shown_right in SIDES:
+            of_pose = (pixels[numbers[left]] - pixels[numbers[right]]) / one.crop.side
+            of_picture = (one.points[shown_left] - one.points[shown_right]) / one.crop.side
+            along += float(of_pose @ of_picture)
+            length += float(np.linalg.norm(of_pose) * np.linalg.norm(of_picture))
+    return along / length if length else 0.0
+
+
+def person_around(
+    network: PersonNetwork, cameras: Sequence[Camera], pictures: Mapping[str, Bytes], joints: Array
+) -> dict[str, Detection]:
+    """Who is seen for certain where a person's joints (J, 3) lie, by camera; without those that see nobody there.
+
+    pictures : (H, W, 3), BGR, by camera.
+    """
+    found = dict[str, Detection]()
     for camera in cameras:
         pixels, depths = project(camera, joints)
-        if (depths <= 0.0).any() or not np.isfinite(pixels).all():
+        if camera.name not in pictures or (depths <= 0.0).any() or not np.isfinite(pixels).all():
             continue
         low, high = pixels.min(axis=0), pixels.max(axis=0)
         middle, side = 0.5 * (low + high), MARGIN * float((high - low).max())
         crop = Crop(float(middle[0]), float(middle[1]), side, -0.5 * math.pi * camera.quarter_turns)
-        picture = pictures[camera.name]
-        first = network.look(picture, crop)
+        first = network.look(pictures[camera.name], crop)
         if not first.is_person() or abs(math.log(first.next_crop.side / side)) > math.log(SAME_SIZE):
             continue
-        seen = network.look(picture, first.next_crop)
-        if max(first.presence, seen.presence) < FOUND or not seen.is_person():
-            continue
-        for left, right, shown_left, shown_right in SIDES:
-            of_pose = (pixels[numbers[left]] - pixels[numbers[right]]) / side
-            of_picture = (seen.points[shown_left] - seen.points[shown_right]) / side
-            along += float(of_pose @ of_picture)
-            length += float(np.linalg.norm(of_pose) * np.linalg.norm(of_picture))
-    return along / length if length else 0.0
+        seen = network.look(pictures[camera.name], first.next_crop)
+        if max(first.presence, seen.presence) >= FOUND and seen.is_person():
+            found[camera.name] = seen
+    return found

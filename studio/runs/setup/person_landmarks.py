@@ -87,7 +87,7 @@ def _joints(
     for way in ways:
         exchanged = dict(zip(names, (False, *way, *[False] * len(names)), strict=False))
         pixels = {name: _pixels(seen[name], exchanged[name]) for name in names}
-        points = _meeting(cameras, pixels)
+        points = meeting_of(cameras, pixels)
         if points is None:
             continue
         missed = float(np.mean([np.median(_misses(cameras[name], points, pixels[name])) for name in names]))
@@ -121,7 +121,8 @@ def _misses(camera: Camera, points: Array, pixels: Array) -> Array:
     return np.asarray(np.linalg.norm(project(camera, points)[0] - pixels, axis=1))
 
 
-def _meeting(cameras: Mapping[str, Camera], pixels: Mapping[str, Array]) -> Array | None:
+def meeting_of(cameras: Mapping[str, Camera], pixels: Mapping[str, Array]) -> Array | None:
+    """(N, 3) mm where the rays of pixels (N, 2) of each camera meet; None where they do not."""
     try:
         return triangulated([cameras[name] for name in pixels], pixels)
     except CalibrationError:
@@ -135,14 +136,20 @@ def _without_outliers(
     cleaned = points.copy()
     for row in range(len(points)):
         rays = {name: places[row : row + 1] for name, places in pixels.items()}
-        cleaned[row] = _of_those_that_agree(cameras, rays, seen, points[row : row + 1])
+        cleaned[row], _ = of_those_that_agree(cameras, rays, seen, points[row : row + 1])
     return cleaned
 
 
-def _of_those_that_agree(
-    cameras: Mapping[str, Camera], rays: Mapping[str, Array], seen: Detections, point: Array
-) -> Array:
-    """(1, 3) where the rays (1, 2 pixels each) of the largest set of cameras meet that agree on the point."""
+def of_those_that_agree(
+    cameras: Mapping[str, Camera],
+    rays: Mapping[str, Array],
+    seen: Detections,
+    point: Array,
+    apart: float = APART,
+) -> tuple[Array, int]:
+    """(1, 3) where the rays (1, 2 pixels each) of the largest set of cameras meet that agree on the point, and how many
+    these are; NaN and 0 where no two do. apart : as `APART`.
+    """
 
     def contradiction(among: Mapping[str, Array], at: Array) -> float:
         return max(
@@ -150,12 +157,12 @@ def _of_those_that_agree(
         )
 
     left: dict[str, Array] = dict(rays)
-    while contradiction(left, point) > APART:
-        if len(left) == 2:
-            return np.full_like(point, np.nan)
+    while contradiction(left, point) > apart:
         fewer = [{name: left[name] for name in left if name != gone} for gone in left]
-        meeting = [(rest, at) for rest in fewer if (at := _meeting(cameras, rest)) is not None]
+        meeting = [
+            (rest, at) for rest in fewer if len(rest) > 1 and (at := meeting_of(cameras, rest)) is not None
+        ]
         if not meeting:
-            return np.full_like(point, np.nan)
+            return np.full_like(point, np.nan), 0
         left, point = min(meeting, key=lambda one: contradiction(*one))
-    return point
+    return point, len(left)

@@ -37,6 +37,7 @@ from studio.results.comparison.tracked import Tracked, TrackingTrial, pose_on_tr
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.results.drawing_footage.real_data import PREFIX, real_data_folder
 from studio.results.evaluation.errors import limb_of_markers, lost_mm
+from studio.runs.setup.person_witness import LimbsByNetwork, missed
 from studio.runs.setup.shape_on_the_way import fit_session_shape
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, default_settings
 from studio.search.trackers.agreement import FAR_MM, Agreement, limb_names
@@ -130,15 +131,17 @@ def plant(
     cameras, tree = session.cameras(), session.body(BODY)
     body, _, _ = fit_session_shape(session, tree, settings, pose_on_truth(session, tree, 0), 0)
     whole, three = Looking(body, cameras), Looking(body, cameras[:3])
+    footage = session.footage()
     for frame in evenly_spread(session.manifest.frame_count, frames):
         evidence = cache.evidence(session, cameras, int(frame), settings.evidence, "proximity")
         changed = tuple(changes_by_camera(evidence).values())
+        pictures = {camera.name: footage.picture(camera.name, int(frame)) for camera in cameras}
         seen = [distances_of(view.mask, POINTS) for view in evidence.views]
         truth = pose_on_truth(session, body, int(frame))
         pose = whole.refined(truth, seen)
         if lost_limbs(body, pose, truth):
             continue
-        yield SOUND, "", whole.named(pose, seen, changed), whole.checked(pose, seen, changed)
+        yield SOUND, "", whole.named(pose, seen, changed), whole.checked(pose, seen, changed, pictures)
         rng = keyed_generator(seed, int(frame), 0, 0, KEY)
         for limb in whole.movable:
             draws = whole.drawn(rng, pose, limb)
@@ -161,7 +164,7 @@ def plant(
                         cause,
                         limb,
                         looking.named(ended, masks, changed),
-                        looking.checked(ended, masks, changed),
+                        looking.checked(ended, masks, changed, pictures),
                     )
 
 
@@ -183,7 +186,7 @@ class Looking:
         self.body, self.cameras = body, cameras
         self._refiner = Refiner(body, cameras, RefinementSettings(refinement_steps=6))
         self._agreement, self._certainty = Agreement(body, cameras), CertaintyOfLimbs(self._refiner)
-        self._witness = LimbsElsewhere(body, cameras)
+        self._witness, self._network = LimbsElsewhere(body, cameras), LimbsByNetwork(body, cameras)
 
     @property
     def movable(self) -> tuple[str, ...]:
@@ -225,14 +228,20 @@ class Looking:
         return tuple(limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY)
 
     def checked(
-        self, pose: Array, seen: Sequence[SilhouetteDistances], changed: Sequence[Change]
+        self,
+        pose: Array,
+        seen: Sequence[SilhouetteDistances],
+        changed: Sequence[Change],
+        pictures: Mapping[str, Bytes],
     ) -> tuple[str, ...]:
-        """The limbs that a check of the run calls contradicted. changed : as in `LimbsElsewhere.of`, of all cameras."""
+        """The limbs that a check of the run calls contradicted. changed : as in `LimbsElsewhere.of`, of all cameras.
+        pictures : of all cameras.
+        """
         elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
         off = self._agreement.of(pose, seen)
         shares = without_sure(off, elsewhere).shares()
         denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
-        return (*denied, *lost_of(elsewhere))
+        return (*denied, *lost_of(elsewhere), *missed(self._network.lost(pose, pictures), elsewhere))
 
     def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[Bytes]:
         """Each view's mask (H, W) without a limb of a pose, where no other limb of it lies."""
