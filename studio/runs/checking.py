@@ -214,7 +214,9 @@ def check_run(
                     elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
                 off = without_sure(off, elsewhere)
                 seen = network.lost(pose, _pictures(footage, cameras, frame)) if network.usable else {}
-                contradicted += _with_elsewhere(frame, off.shares(), {*lost_of(elsewhere), *missed(seen, elsewhere)})
+                contradicted += _with_elsewhere(
+                    frame, off.shares(), {*lost_of(elsewhere), *missed(seen, elsewhere)}
+                )
     check = RunCheck(
         track=chosen.name,
         stamp=track_stamp(run, chosen.name),

@@ -86,6 +86,13 @@ def test_pictures_that_see_it_where_it_is_count_for_it(monkeypatch: pytest.Monke
     assert lost(monkeypatch, wrong, {first: places}) == {}
 
 
+def test_pictures_that_show_the_trunk_elsewhere_say_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    truth, wrong = standing(), standing(**{RAISED: 70.0})
+    places = marker_points(BODY, truth[None])[0]
+    assert lost(monkeypatch, wrong, shown_by_all(places)) != {}
+    assert lost(monkeypatch, wrong, shown_by_all(places + [0.0, 0.0, 900.0])) == {}
+
+
 def test_sides_that_the_network_exchanges_lose_no_limb(monkeypatch: pytest.MonkeyPatch) -> None:
     truth = standing(**{RAISED: 70.0})
     places = marker_points(BODY, truth[None])[0]
