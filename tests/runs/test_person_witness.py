@@ -90,7 +90,7 @@ def test_pictures_that_show_the_trunk_elsewhere_say_nothing(monkeypatch: pytest.
     truth, wrong = standing(), standing(**{RAISED: 70.0})
     places = marker_points(BODY, truth[None])[0]
     assert lost(monkeypatch, wrong, shown_by_all(places)) != {}
-    assert lost(monkeypatch, wrong, shown_by_all(places + [0.0, 0.0, 900.0])) == {}
+    assert lost(monkeypatch, wrong, shown_by_all(places + np.array([0.0, 0.0, 900.0]))) == {}
 
 
 def test_sides_that_the_network_exchanges_lose_no_limb(monkeypatch: pytest.MonkeyPatch) -> None:

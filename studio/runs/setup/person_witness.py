@@ -2,10 +2,10 @@
 
 An arm before the trunk is in no silhouette, and one that the masks lack denies no pose; the network sees it all the
 same. In one picture it is often wrong: in a quarter of the frames of eleven clips a joint is 150 mm or more from where
-its points meet. So pictures vote. Those count against a limb that agree with one
-another on another place of one of its joints, those for it that see the joint where the pose has it; which of both
-sides is the left one, which the network exchanges at times, each picture says as the pose does. A limb is missed where
-at least MORE pictures more are against it than for it.
+its points meet. So pictures vote. Those count against a limb that agree with one another on another place of one of its
+joints, those for it that see the joint where the pose has it; which of both sides is the left one, which the network
+exchanges at times, each picture says as the pose does. A limb is missed where at least MORE pictures more are against
+it than for it.
 
 A picture in which the network does not even see shoulders and hips where the pose has them counts for nothing: people
 upside down are read badly.
