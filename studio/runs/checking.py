@@ -18,8 +18,7 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
-from studio.footage.capture.footage import Footage
-from studio.foundations.arrays import Array, Bytes
+from studio.foundations.arrays import Array
 from studio.foundations.errors import RunError, SessionError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress, no_progress
@@ -28,7 +27,7 @@ from studio.runs.drawing.overlay_drawing import projected_silhouette
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.refining import jitter
 from studio.runs.run_footage import filmed_cameras, footage_of
-from studio.runs.setup.person_witness import LimbsByNetwork, missed
+from studio.runs.setup.person_witness import LimbsByNetwork
 from studio.runs.tracks import BEST, Track, read_track, track_stamp
 from studio.search.likelihood.overlay import limb_contours
 from studio.search.settings import RunSettings, settings_from_values
@@ -43,6 +42,7 @@ from studio.search.trackers.limbs_elsewhere import (
 )
 from studio.search.trackers.loss_detection import anything_seen
 from studio.search.trackers.start_candidates import facing
+from studio.search.trackers.told_limbs import limbs_told
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
@@ -212,11 +212,12 @@ def check_run(
                 elsewhere = dict[str, Elsewhere]()
                 if witness.usable:
                     elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
-                off = without_sure(off, elsewhere)
-                seen = network.lost(pose, _pictures(footage, cameras, frame)) if network.usable else {}
-                contradicted += _with_elsewhere(
-                    frame, off.shares(), {*lost_of(elsewhere), *missed(seen, elsewhere)}
-                )
+                pictures = {view.camera: view.picture for view in evidence.views}
+                told = limbs_told(network, pose, pictures, elsewhere)
+                contradicted += [
+                    ContradictedLimb(frame, limb, *found)
+                    for limb, found in contradicted_limbs(off, elsewhere, told).items()
+                ]
     check = RunCheck(
         track=chosen.name,
         stamp=track_stamp(run, chosen.name),
@@ -284,20 +285,18 @@ def _contradicted(
     return agreement.of(pose, seen)
 
 
-def _pictures(footage: Footage, cameras: Sequence[Camera], frame: int) -> dict[str, Bytes]:
-    absent = footage.absent(frame)
-    return {one.name: footage.picture(one.name, frame) for one in cameras if one.name not in absent}
-
-
-def _with_elsewhere(frame: int, off: Mapping[str, float], lost: Collection[str]) -> list[ContradictedLimb]:
-    """The limbs that masks or pictures contradict. off : as of `_contradicted`. lost : of `LimbsElsewhere` and
-    `LimbsByNetwork`.
+def contradicted_limbs(
+    off: Disagreement, elsewhere: Mapping[str, Elsewhere], told: Collection[str]
+) -> dict[str, tuple[float, bool]]:
+    """By limb that masks or pictures contradict the share of its area that disagrees with the masks, and whether the
+    pictures do. off : of a pose. elsewhere : of `LimbsElsewhere`. told : limbs that the network sees elsewhere.
     """
-    return [
-        ContradictedLimb(frame, limb, round(share, 3), limb in lost)
-        for limb, share in off.items()
+    lost = {*lost_of(elsewhere), *told}
+    return {
+        limb: (round(share, 3), limb in lost)
+        for limb, share in without_sure(off, elsewhere).shares().items()
         if share > LIMB_LOST_SHARE or limb in lost
-    ]
+    }
 
 
 def sudden_turns(body: BodyModel, track: Track, fps: float) -> tuple[int, ...]:

@@ -26,6 +26,7 @@ from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
 from studio.runs.run_watch import FrameSource, RunWatch
+from studio.runs.setup.person_witness import LimbsByNetwork
 from studio.runs.storing_behind import MOST_WAITING, StoringBehind
 from studio.search.likelihood.problem import BaseFrameLikelihood
 from studio.search.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
@@ -109,7 +110,12 @@ class TrackingRun:
         self._refiner = (
             None
             if self._seen is None
-            else FrameRefiner(self._seen.body, self._seen.cameras, self.record.seed)
+            else FrameRefiner(
+                self._seen.body,
+                self._seen.cameras,
+                self.record.seed,
+                None if self.record.live else LimbsByNetwork(self._seen.body, self._seen.cameras),
+            )
         )
         self._writer = ResultsWriter(run.folder)
         self._pace = Pace()

@@ -15,6 +15,7 @@ from studio.foundations.geometry.projection import project
 from studio.runs.setup import person_witness
 from studio.runs.setup.person_landmarks import PAIRS
 from studio.runs.setup.person_witness import LimbsByNetwork
+from studio.search.trackers.told_limbs import ToldLimb
 
 BODY = load_body("human35")
 CAMERAS = tuple(ring_of_cameras(4))
@@ -40,7 +41,7 @@ def lost(
     pose: Array,
     shown: Mapping[str, Array],
     exchanged: Collection[str] = (),
-) -> dict[str, float]:
+) -> dict[str, ToldLimb]:
     """Limbs of a pose (D,) that are lost where cameras show people with markers (M, 3)."""
     by_name = {camera.name: camera for camera in CAMERAS}
     found = {name: seen(by_name[name], places, name in exchanged) for name, places in shown.items()}
@@ -73,7 +74,9 @@ def test_a_limb_is_missed_that_the_pictures_show_in_another_place(monkeypatch: p
     named = lost(monkeypatch, wrong, shown_by_all(places))
     wrist = NAMES.index("LWrist")
     assert set(named) == {"left arm"}
-    assert named["left arm"] == pytest.approx(np.linalg.norm(moved[wrist] - places[wrist]), abs=1.0)
+    assert named["left arm"].off == pytest.approx(np.linalg.norm(moved[wrist] - places[wrist]), abs=1.0)
+    assert list(named["left arm"].markers) == [NAMES.index("LElbow"), wrist]
+    np.testing.assert_allclose(named["left arm"].places, places[list(named["left arm"].markers)], atol=1.0)
 
 
 def test_pictures_that_see_it_where_it_is_count_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,6 +105,7 @@ def test_sides_that_the_network_exchanges_lose_no_limb(monkeypatch: pytest.Monke
 
 
 def test_only_people_seen_from_two_sides_are_asked_for() -> None:
-    assert LimbsByNetwork(BODY, CAMERAS).usable
-    assert not LimbsByNetwork(BODY, CAMERAS[:1]).usable
-    assert not LimbsByNetwork(load_body("mouse31"), CAMERAS).usable
+    assert LimbsByNetwork(BODY, CAMERAS).limbs == ("left arm", "right arm", "left leg", "right leg")
+    for nobody in (LimbsByNetwork(BODY, CAMERAS[:1]), LimbsByNetwork(load_body("mouse31"), CAMERAS)):
+        assert nobody.limbs == ()
+        assert nobody.lost(BODY.neutral, {}) == {}

@@ -28,6 +28,7 @@ from studio.results.inspection.error_parts import PARTS
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.live.following import Following, step_together
 from studio.runs.search_space import search_space, session_sigma
+from studio.runs.setup.person_witness import LimbsByNetwork
 from studio.runs.setup.shape_on_the_way import WEIGHTING, shaped_body
 from studio.runs.sides import known_silhouettes
 from studio.search.behaviour.model import BehaviourModel
@@ -199,8 +200,11 @@ def track_seeds(
 
         return note
 
+    teller = LimbsByNetwork(body, seen_with)
     runs = [
-        Following(settings, space, start_of(start), seed, FrameRefiner(body, seen_with, seed), noting(own))
+        Following(
+            settings, space, start_of(start), seed, FrameRefiner(body, seen_with, seed, teller), noting(own)
+        )
         for seed, own in zip(seeds, evidences, strict=True)
     ]
     likelihood = WEIGHTINGS[trial.weighting].prepare(body, seen_with, settings.weighting)

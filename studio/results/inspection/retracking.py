@@ -18,6 +18,7 @@ from studio.results.inspection.reading import InspectedRun
 from studio.results.inspection.wanted import stop_if_left
 from studio.runs.frame_steps import FrameHistory, space_over
 from studio.runs.run_behaviour import RunBehaviour
+from studio.runs.setup.person_witness import LimbsByNetwork
 from studio.search.settings import RunSettings, changed_settings
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.frame_loop import search_frame
@@ -57,7 +58,9 @@ class Retracking:
         """The results of all frames. start : (D,) a pose at which the first begins. Raises SettingsError, LeftError."""
         carried = self._carried if start is None else _state_at(start, self._carried)
         seed = self.run.run.record.seed + change.seed
-        refiner = FrameRefiner(self.run.body, self._source.cameras, seed)
+        body, cameras = self.run.body, self._source.cameras
+        teller = None if self.run.run.record.live else LimbsByNetwork(body, cameras)
+        refiner = FrameRefiner(body, cameras, seed, teller)
         results: list[FrameResult] = []
         for frame in self.frames:
             stop_if_left()

@@ -17,6 +17,7 @@ in a quarter of 134.
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from studio.foundations.geometry.projection import project
 from studio.runs.setup.person_facing import person_around
 from studio.runs.setup.person_landmarks import PAIRS, meeting_of, of_those_that_agree
 from studio.runs.setup.person_masks import Detections
-from studio.search.trackers.limbs_elsewhere import Elsewhere, is_shown
+from studio.search.trackers.told_limbs import ToldLimb
 
 LIMB_JOINTS = ("Elbow", "Wrist", "Knee", "Ankle")
 """Joints that tell where a limb is, by the network and by our bodies' markers; all but those at the trunk."""
@@ -48,44 +49,56 @@ MORE = 2
 
 
 class LimbsByNetwork:
-    """Asks the network where a person's limbs are; usable for bodies whose markers are a person's."""
+    """Asks the network where a person's limbs are (`search.trackers.told_limbs.LimbTeller`). limbs : of which it knows;
+    none for bodies whose markers are no person's.
+    """
 
     def __init__(self, body: BodyModel, cameras: Sequence[Camera]) -> None:
         names = [marker.name for marker in body.markers]
-        self.usable = len(cameras) >= MORE and all(
+        usable = len(cameras) >= MORE and all(
             f"{side}{joint}" in names for joint in (*TRUNK, *LIMB_JOINTS) for side in "LR"
         )
-        if not self.usable:
-            return
-        self._body, self._cameras, self._far = (
-            body,
-            {one.name: one for one in cameras},
-            FAR_MM * scale_of(body),
-        )
-        self._rows = [[names.index(f"{side}{joint}") for side in "LR"] for joint in LIMB_JOINTS]
-        self._trunk = [names.index(f"{side}{joint}") for joint in TRUNK for side in "LR"]
-        self._limbs = [
+        self._body, self._cameras = body, {one.name: one for one in cameras}
+        self._far, self._joints = FAR_MM * scale_of(body), LIMB_JOINTS if usable else ()
+        self._rows = [[names.index(f"{side}{joint}") for side in "LR"] for joint in self._joints]
+        self._trunk = [names.index(f"{side}{joint}") for joint in TRUNK for side in "LR"] if usable else []
+        self._owners = [
             [limb_moving(body, body.markers[row].joint) or "" for row in rows] for rows in self._rows
         ]
-        self._network = PersonNetwork()
+        self.limbs = tuple(dict.fromkeys(limb for owners in self._owners for limb in owners))
 
-    def lost(self, pose: Array, pictures: Mapping[str, Bytes]) -> dict[str, float]:
-        """By limb of a pose (D,) that is not where the network sees it how far one of its joints is from there, mm at
-        most. pictures : (H, W, 3), BGR, by camera.
+    @cached_property
+    def _network(self) -> PersonNetwork:
+        return PersonNetwork()
+
+    def lost(self, pose: Array, pictures: Mapping[str, Bytes]) -> dict[str, ToldLimb]:
+        """The limbs of a pose (D,) that are not where the network sees them, with all of their joints that it sees.
+        pictures : (H, W, 3), BGR, by camera.
         """
+        if not self.limbs:
+            return {}
         around = joint_frames(self._body, pose)[0, :, :, 3]
         seen = person_around(self._network, tuple(self._cameras.values()), pictures, around)
-        places = marker_points(self._body, pose[None])[0]
-        trunk = places[self._trunk]
+        own = marker_points(self._body, pose[None])[0]
+        trunk = own[self._trunk]
         seen = {name: one for name, one in seen.items() if self._is_read_right(name, one, trunk)}
-        found = dict[str, float]()
+        off, places = dict.fromkeys(self.limbs, 0.0), {limb: dict[int, Array]() for limb in self.limbs}
         if len(seen) < MORE:
-            return found
-        for joint, rows, limbs in zip(LIMB_JOINTS, self._rows, self._limbs, strict=True):
-            for limb, off in zip(limbs, self._off(places[rows], PAIRS[joint], seen), strict=True):
-                if off > self._far:
-                    found[limb] = max(found.get(limb, 0.0), off)
-        return found
+            return {}
+        for joint, rows, owners in zip(self._joints, self._rows, self._owners, strict=True):
+            for row, limb, (place, is_kept) in zip(
+                rows, owners, self._places(own[rows], PAIRS[joint], seen), strict=True
+            ):
+                if place is None:
+                    continue
+                places[limb][row] = place
+                if not is_kept:
+                    off[limb] = max(off[limb], float(np.linalg.norm(place - own[row])))
+        return {
+            limb: ToldLimb(away, tuple(places[limb]), np.array(list(places[limb].values())))
+            for limb, away in off.items()
+            if away > self._far
+        }
 
     def _is_read_right(self, camera: str, one: Detection, trunk: Array) -> bool:
         """Whether a picture shows the ends of shoulders and hips (4, 3) where the pose has them."""
@@ -99,9 +112,9 @@ class LimbsByNetwork:
             away += min(float(np.linalg.norm(way, axis=1).mean()) for way in ways) / len(TRUNK)
         return away < READ * one.next_crop.side
 
-    def _off(self, own: Array, pair: tuple[int, int], seen: Detections) -> list[float]:
-        """How far a left and a right joint (2, 3) are from where more pictures see them, mm; 0 where as many see them
-        where they are. pair : the network's points.
+    def _places(self, own: Array, pair: tuple[int, int], seen: Detections) -> list[tuple[Array | None, bool]]:
+        """Where a left and a right joint are (2 of (3,) mm; None where no two pictures agree on it), and whether as
+        many pictures see it where the pose has it, at `own` (2, 3). pair : the network's points.
         """
         shown, near = dict[str, Array](), dict[str, Array]()
         for name, one in seen.items():
@@ -110,21 +123,14 @@ class LimbsByNetwork:
             away = [np.linalg.norm(way - pixels, axis=1) / side for way in ways]
             best = int(np.argmin([each.sum() for each in away]))
             shown[name], near[name] = ways[best], away[best] < NEAR
-        found: list[float] = []
-        for row, place in enumerate(own):
+        found: list[tuple[Array | None, bool]] = []
+        for row in range(len(own)):
             rays = {name: points[row : row + 1] for name, points in shown.items()}
             point = meeting_of(self._cameras, rays)
             if point is None:
-                found.append(0.0)
+                found.append((None, True))
                 continue
             point, against = of_those_that_agree(self._cameras, rays, seen, point, AGREE)
             kept = against - sum(bool(one[row]) for one in near.values()) < MORE
-            found.append(0.0 if kept else float(np.linalg.norm(point[0] - place)))
+            found.append((point[0] if against else None, kept))
         return found
-
-
-def missed(lost: Mapping[str, float], pictures: Mapping[str, Elsewhere]) -> set[str]:
-    """Of limbs that the network sees elsewhere (`LimbsByNetwork.lost`) those that do not show by themselves where the
-    pose has them: a leg that is kicked high explains what changed there, whatever the network makes of it.
-    """
-    return {limb for limb in lost if limb not in pictures or not is_shown(pictures[limb])}

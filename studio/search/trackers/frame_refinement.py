@@ -41,6 +41,16 @@ from studio.search.trackers.limbs_elsewhere import (
 )
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import FLOOR_HELP, Distances, RefinementSettings, Refiner
+from studio.search.trackers.told_limbs import (
+    THERE_MM,
+    TOLD,
+    LimbTeller,
+    ToldLimb,
+    is_asked,
+    limbs_told,
+    missed,
+    off_from,
+)
 from studio.search.trackers.tracker import (
     LIMB_LOST_SHARE,
     FilterState,
@@ -80,6 +90,9 @@ DENIED, CONFIRMED = 0.25, 0.4
 """Shares of the expected gain. A limb that shows by itself is resampled if its colours should gain twice LEAST_GAIN
 and do not reach the first; only a pose that reaches the second is taken, with BETTER_CHAIN of the loss. Chosen on own
 start poses of *tiles*, in one of three of which a wrong arm stayed wrong (25.7 mm → 14.7)."""
+TOLD_SHARE, NEARER = 1.0, 0.6
+"""Share of the loss, and of how far a limb is from where it is told to be, up to which a pose is taken that has it
+there."""
 DENIED_DRAWS, DENIED_REFINED = 4096, 16
 """Poses drawn of such a limb, which is far from where it belongs, and how many are refined."""
 REDRAWN = 0x11A6
@@ -111,6 +124,10 @@ class FrameRefinementSettings:
     limb_colours: bool = next_frame_knob(
         True, label="colours of limbs",
         help="Learn the colours of limbs, and resample one before the body where they say that it is not there.",
+    )  # fmt: skip
+    ask_network_every: int = next_frame_knob(
+        10, 0, 1000, 1, label="ask the network every", unit="frames",
+        help="How often the network that knows people is asked where limbs are that do not show; 0: never.",
     )  # fmt: skip
     above_floor: bool = next_frame_knob(True, label="stays above the floor", help=FLOOR_HELP)
     refined_spread: float = next_frame_knob(
@@ -150,11 +167,15 @@ class SilhouettesOf(Protocol):
 
 
 class FrameRefiner:
-    """Refines the frames of one body; what is prepared for some cameras is kept. seed : of the run."""
+    """Refines the frames of one body; what is prepared for some cameras is kept. seed : of the run. teller : tells
+    where limbs are; None: nobody does.
+    """
 
-    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], seed: int) -> None:
+    def __init__(
+        self, body: BodyModel, cameras: tuple[Camera, ...], seed: int, teller: LimbTeller | None = None
+    ) -> None:
         self._body, self._cameras = body, {camera.name: camera for camera in cameras}
-        self._seed = seed
+        self._seed, self._teller = seed, teller
         self._prepared = functools.cache(self._made_for)
 
     def refined(
@@ -192,12 +213,21 @@ class FrameRefiner:
                 rng, seen_frame.hypothesis(pose), seen_frame, result.carried.previous_estimate
             )
             pose, off = found.pose, found.off
-        changed = () if changes_of is None or not witness.usable else tuple(changes_of().values())
+        asked = self._teller is not None and is_asked(result.frame, settings.ask_network_every, memory)
+        changes: Mapping[str, Change] = (
+            changes_of() if changes_of is not None and (witness.usable or asked) else {}
+        )
+        changed = tuple(changes.values()) if witness.usable else ()
         elsewhere = witness.of(pose, changed, memory) if changed else {}
-        if settings.redraw_limbs and (named := lost_of(elsewhere)):
-            spots = witness.spots(pose, changed, named, memory)
+
+        def with_changes(limbs: Sequence[str]) -> tuple[tuple[Distances, ...], list[Distances]]:
+            """The silhouettes with what changed where some limbs may be, all and without what is hidden."""
+            spots = witness.spots(pose, changed, limbs, memory)
             shown = tuple(silhouettes_of(settings.refine_frame_points, spots).values())
-            without = without_hidden(shown, agreement.cameras, agreement.mm_per_pixel(pose), memory)
+            return shown, without_hidden(shown, agreement.cameras, agreement.mm_per_pixel(pose), memory)
+
+        if settings.redraw_limbs and (named := lost_of(elsewhere)):
+            shown, without = with_changes(named)
             rng = keyed_generator(self._seed, result.frame, 0, 1, REDRAWN)
             seen_frame = SeenFrame(redrawing, agreement, without)
             began_with = seen_frame.hypothesis(pose)
@@ -217,6 +247,20 @@ class FrameRefiner:
             evaluations += more
             if found is not began_with:
                 pose, off, elsewhere = found.pose, found.off, witness.of(found.pose, changed, memory)
+        told: Mapping[str, ToldLimb] | None = None
+        if self._teller is not None and asked:
+            pictures = {name: one.picture for name, one in changes.items()}
+            told = limbs_told(self._teller, pose, pictures, elsewhere)
+        if told and settings.redraw_limbs:
+            shown, without = with_changes(tuple(told)) if changed else (masks, silhouettes)
+            rng = keyed_generator(self._seed, result.frame, 0, 3, REDRAWN)
+            seen_frame = SeenFrame(redrawing, agreement, without)
+            began_with = seen_frame.hypothesis(pose)
+            found, more = drawn_where_told(rng, began_with, seen_frame, told)
+            evaluations += more
+            if found is not began_with:
+                pose, off, masks, silhouettes = found.pose, found.off, shown, without
+                elsewhere = witness.of(pose, changed, memory) if changed else {}
         weight = float(problem.log_likelihood(pose[None])[0])
         estimate = dataclasses.replace(result.estimate, pose=pose, searched=start, log_weight=weight)
         carried = _carried(result, pose, settings.next_frame_from, refiner)
@@ -228,14 +272,30 @@ class FrameRefiner:
             **certainty.moved,
             **colours.learnt(pose, views, elsewhere, memory),
         }
+        still = self._still_told(told, pose, certainty.limbs, memory)
+        memory[TOLD] = still
+        named = [limb for limb, one in zip(certainty.limbs, still, strict=True) if one]
         return dataclasses.replace(
             result,
             estimate=estimate,
             carried=dataclasses.replace(carried, memory=memory),
             evaluations=result.evaluations + evaluations,
             disagreement=off.shares(),
-            limb_loss=certainty.lost(off, elsewhere),
+            limb_loss=certainty.lost(off, elsewhere, missed(named, elsewhere)),
         )
+
+    def _still_told(
+        self,
+        told: Mapping[str, ToldLimb] | None,
+        pose: Array,
+        limbs: Sequence[str],
+        memory: Mapping[str, Array],
+    ) -> Array:
+        """(G,) 1 for a limb that is told to be elsewhere than a pose has it, now or when it was last asked."""
+        if told is None:
+            return memory.get(TOLD, np.zeros(len(limbs)))
+        there = {limb: off_from(self._body, pose[None], one)[0] <= THERE_MM for limb, one in told.items()}
+        return np.array([float(limb in told and not there[limb]) for limb in limbs])
 
     def _made_for(
         self, names: tuple[str, ...], settings: RefinementSettings, redrawing: RefinementSettings
@@ -397,6 +457,29 @@ def recoloured(
             then = gains_of(pose[None], limb)
             if then.gain[0] >= (max(most, CONFIRMED * then.expected[0]) if shows else most):
                 found, most = frame.hypothesis(pose), then.gain[0]
+    return found, evaluations
+
+
+def drawn_where_told(
+    rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, told: Mapping[str, ToldLimb]
+) -> tuple[Hypothesis, int]:
+    """The hypothesis with limbs where they are told to be, if the silhouettes agree with it as well, and the number of
+    poses compared.
+    """
+    evaluations, body = 0, frame.refiner.body
+    for limb, one in told.items():
+        own = bent_by(frame.refiner, limb)
+        if len(own) < FEWEST_ANGLES:
+            continue
+        drawn = _drawn(rng, frame.refiner, found.pose[None], own, DENIED_DRAWS)
+        evaluations += len(drawn)
+        allowed, there = TOLD_SHARE * found.loss, float(off_from(body, found.pose[None], one)[0])
+        there = min(THERE_MM, NEARER * there)
+        for start in _best_apart(drawn, off_from(body, drawn, one), own, ALL_REFINED):
+            pose = frame.refiner.refine(start, frame.silhouettes).pose
+            loss = frame.refiner.loss_with_pull(pose, frame.silhouettes)
+            if loss <= allowed and off_from(body, pose[None], one)[0] <= there:
+                found, allowed = frame.hypothesis(pose), min(allowed, loss)
     return found, evaluations
 
 

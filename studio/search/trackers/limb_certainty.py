@@ -36,7 +36,7 @@ The standard deviations rank limbs; they are not calibrated. Scaled so that 68 %
 a clothed body and the cones differ, which is the same in all frames of a clip.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,14 +79,19 @@ class Certainty:
     jump: Array
     moved: Mapping[str, Array]
 
-    def lost(self, off: Disagreement, pictures: Mapping[str, Elsewhere] | None = None) -> dict[str, float]:
+    def lost(
+        self,
+        off: Disagreement,
+        pictures: Mapping[str, Elsewhere] | None = None,
+        told: Collection[str] = (),
+    ) -> dict[str, float]:
         """By limb the probability that it is lost. off : the pose's disagreement with the silhouettes. pictures : by
-        limb what changed in them, if that is known.
+        limb what changed in them, if that is known. told : limbs that somebody tells to be elsewhere (`told_limbs`).
         """
         known = pictures or {}
         signs, bare = self.signs(without_sure(off, known), known)
         odds = np.where(bare > LIMB_LOST_SHARE, np.inf, CONSTANT + signs @ WEIGHTS)
-        elsewhere = lost_of(known)
+        elsewhere = {*lost_of(known), *told}
         odds = np.where([limb in elsewhere for limb in self.limbs], np.maximum(odds, WITNESSED), odds)
         return dict(zip(self.limbs, (1.0 / (1.0 + np.exp(-odds))).tolist(), strict=True))
 

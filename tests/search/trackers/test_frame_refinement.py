@@ -212,7 +212,8 @@ def test_the_last_frames_pose_is_tried_where_the_search_failed(
         result, carried=dataclasses.replace(result.carried, previous_estimate=truth + 0.03)
     )
     lost, kept = (refiner.refined(one, seen, problem, SETTINGS) for one in (result, followed))
-    assert off(body, lost.estimate.pose, truth) > 100.0
+    # 94 or 105 mm, by the processor.
+    assert off(body, lost.estimate.pose, truth) > 50.0
     assert off(body, kept.estimate.pose, truth) < 10.0
 
 

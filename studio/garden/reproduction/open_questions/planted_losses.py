@@ -37,7 +37,8 @@ from studio.results.comparison.tracked import Tracked, TrackingTrial, pose_on_tr
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.results.drawing_footage.real_data import PREFIX, real_data_folder
 from studio.results.evaluation.errors import limb_of_markers, lost_mm
-from studio.runs.setup.person_witness import LimbsByNetwork, missed
+from studio.runs.checking import contradicted_limbs
+from studio.runs.setup.person_witness import LimbsByNetwork
 from studio.runs.setup.shape_on_the_way import fit_session_shape
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, default_settings
 from studio.search.trackers.agreement import FAR_MM, Agreement, limb_names
@@ -46,12 +47,11 @@ from studio.search.trackers.limbs_elsewhere import (
     Change,
     LimbsElsewhere,
     changes_by_camera,
-    lost_of,
-    without_sure,
 )
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import RefinementSettings, Refiner
-from studio.search.trackers.tracker import LIMB_LOST_PROBABILITY, LIMB_LOST_SHARE
+from studio.search.trackers.told_limbs import limbs_told
+from studio.search.trackers.tracker import LIMB_LOST_PROBABILITY
 
 BODY = "human35"
 FRAMES, QUICK_FRAMES = 8, 2
@@ -238,10 +238,8 @@ class Looking:
         pictures : of all cameras.
         """
         elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
-        off = self._agreement.of(pose, seen)
-        shares = without_sure(off, elsewhere).shares()
-        denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
-        return (*denied, *lost_of(elsewhere), *missed(self._network.lost(pose, pictures), elsewhere))
+        told = limbs_told(self._network, pose, pictures, elsewhere)
+        return tuple(contradicted_limbs(self._agreement.of(pose, seen), elsewhere, told))
 
     def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[Bytes]:
         """Each view's mask (H, W) without a limb of a pose, where no other limb of it lies."""

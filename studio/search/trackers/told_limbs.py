@@ -1,0 +1,84 @@
+"""Limbs of which somebody tells where they are: who knows the body from elsewhere, as a network knows people.
+
+Asking takes long, so it is done every few frames, in none where all of the body's limbs show by themselves, and sooner
+again while a limb is said to be elsewhere. There the limb is drawn over its whole range, the draws are ranked by how
+near their markers come to the places told, the best are refined on the silhouettes, and the pose is kept if its markers
+then are where they are told to be and the silhouettes agree with it as well as before.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from studio.body.forward_kinematics import marker_points
+from studio.body.model import BodyModel
+from studio.body.scale import scale_of
+from studio.foundations.arrays import Array, Bytes
+from studio.search.trackers.limbs_elsewhere import Elsewhere, is_shown
+from studio.search.trackers.tracker import MOVED
+
+TOLD = f"{MOVED}told"
+"""Memory: (G,) 1 for a limb that was last said to be elsewhere."""
+SOONER = 3
+"""Frames until it is asked again while a limb is said to be elsewhere."""
+THERE_MM = 120.0
+"""mm at a person's size: nearer, on the mean, a limb's markers are where they are told to be."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToldLimb:
+    """A limb that is elsewhere. off : mm, how far one of its joints is from where it is told to be, at most. markers :
+    (M,) rows of the body's markers on it. places : (M, 3) mm, where these are.
+    """
+
+    off: float
+    markers: Sequence[int]
+    places: Array
+
+
+class LimbTeller(Protocol):
+    """Who tells where limbs are. limbs : of which it knows."""
+
+    @property
+    def limbs(self) -> Sequence[str]: ...
+
+    def lost(self, pose: Array, pictures: Mapping[str, Bytes]) -> Mapping[str, ToldLimb]:
+        """The limbs of a pose (D,) that are elsewhere. pictures : (H, W, 3), BGR, by camera."""
+        ...
+
+
+def is_asked(frame: int, every: int, memory: Mapping[str, Array]) -> bool:
+    """Whether it is asked in a frame. every : frames, 0 for never. memory : at the frame's start."""
+    if every <= 0:
+        return False
+    apart = min(every, SOONER) if memory.get(TOLD, np.zeros(1)).any() else every
+    return frame % apart == apart - 1
+
+
+def limbs_told(
+    teller: LimbTeller, pose: Array, pictures: Mapping[str, Bytes], shown: Mapping[str, Elsewhere]
+) -> dict[str, ToldLimb]:
+    """The limbs of a pose (D,) that are told to be elsewhere and do not show by themselves where it has them; nobody is
+    asked where all show. pictures : (H, W, 3), BGR, by camera. shown : by limb how it shows in them.
+    """
+    if not missed(teller.limbs, shown):
+        return {}
+    told = teller.lost(pose, pictures)
+    return {limb: told[limb] for limb in missed(told, shown)}
+
+
+def missed(limbs: Collection[str], shown: Mapping[str, Elsewhere]) -> list[str]:
+    """Of limbs that are said to be elsewhere those that do not show by themselves where the pose has them: a leg that
+    is kicked high explains what changed there, whatever is said of it.
+    """
+    return [limb for limb in limbs if limb not in shown or not is_shown(shown[limb])]
+
+
+def off_from(body: BodyModel, poses: Array, told: ToldLimb) -> Array:
+    """(N,) mm at a person's size by which a limb's markers are off from where they are told to be, on the mean, in
+    poses (N, D).
+    """
+    apart = marker_points(body, poses)[:, list(told.markers)] - told.places
+    return np.linalg.norm(apart, axis=2).mean(axis=1) / scale_of(body)

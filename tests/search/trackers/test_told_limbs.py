@@ -1,0 +1,105 @@
+"""A limb is drawn where somebody tells that it is, if the silhouettes agree as well; else it is named."""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+from moving_bodies import standing
+from test_limb_colours import BEFORE, BODY, CAMERAS, WRONG, seen_in
+
+from studio.body.forward_kinematics import marker_points
+from studio.evidence.distance_maps import silhouettes_by_camera
+from studio.foundations.arrays import Array, Bytes
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
+from studio.search.trackers.limbs_elsewhere import Elsewhere, changes_by_camera
+from studio.search.trackers.told_limbs import TOLD, ToldLimb, is_asked, limbs_told, off_from
+from studio.search.trackers.tracker import Estimate, FrameResult, start_of
+
+ARM = [row for row, marker in enumerate(BODY.markers) if marker.name in ("LElbow", "LWrist")]
+SETTINGS = FrameRefinementSettings(limb_colours=False, ask_network_every=5)
+ASKED = 4
+"""A frame in which it is asked every five."""
+
+
+class Told:
+    """Tells where a left arm is that is so in a pose (D,), where it is far from there; counts how often."""
+
+    limbs = ("left arm",)
+
+    def __init__(self, truth: Array) -> None:
+        self.places, self.asked = marker_points(BODY, truth[None])[0, ARM], 0
+
+    def lost(self, pose: Array, pictures: Mapping[str, Bytes]) -> dict[str, ToldLimb]:
+        assert set(pictures) == {camera.name for camera in CAMERAS}
+        self.asked += 1
+        apart = np.linalg.norm(marker_points(BODY, pose[None])[0, ARM] - self.places, axis=1).max()
+        return {"left arm": ToldLimb(float(apart), ARM, self.places)} if apart > 60.0 else {}
+
+
+def refined(
+    teller: Told, frame: int = ASKED, memory: Mapping[str, Array] | None = None, start: Array = WRONG[0]
+) -> FrameResult:
+    """The result of a frame whose search ended with the arm before the chest elsewhere than it is."""
+    evidence, weighting = seen_in(BEFORE), WEIGHTINGS["edge-silhouette"]
+    state = dataclasses.replace(start_of(tuple(start.tolist())), memory=memory or {})
+    return FrameRefiner(BODY, CAMERAS, 5, teller).refined(
+        FrameResult(frame, Estimate(start, start, start, 0.0), 0, 0, 0, 0.0, state),
+        partial(silhouettes_by_camera, evidence),
+        weighting.prepare(BODY, CAMERAS, weighting.settings_type()).problem(evidence),
+        SETTINGS,
+        partial(changes_by_camera, evidence),
+    )
+
+
+def arm_off(pose: Array) -> float:
+    """mm by which the markers of the left arm are off, at most."""
+    points = marker_points(BODY, np.stack([pose, BEFORE]))[:, ARM]
+    return float(np.linalg.norm(points[0] - points[1], axis=1).max())
+
+
+def test_a_limb_is_drawn_where_it_is_told_to_be_in_frames_in_which_that_is_asked() -> None:
+    right = Told(BEFORE)
+    before, found = refined(right, ASKED - 1), refined(right)
+    assert right.asked == 1
+    assert arm_off(before.estimate.pose) > 120.0 > 60.0 > arm_off(found.estimate.pose)
+    assert "left arm" not in found.limbs_lost
+    assert not found.carried.memory[TOLD].any()
+
+
+def test_a_limb_that_the_silhouettes_deny_there_stays_and_is_named_until_it_is_found() -> None:
+    raised = Told(standing(BODY, left_shoulder_rx=2.8))
+    found = refined(raised)
+    assert arm_off(found.estimate.pose) > 100.0
+    assert "left arm" in found.limbs_lost
+    # Named also where it is not asked, and asked again sooner; then it is told to be where the pose has it.
+    later = refined(raised, ASKED + 2, found.carried.memory)
+    assert raised.asked == 1
+    assert "left arm" in later.limbs_lost
+    found_again = refined(Told(BEFORE), 8, later.carried.memory, BEFORE)
+    assert "left arm" not in found_again.limbs_lost
+
+
+def test_it_is_asked_every_few_frames_and_sooner_while_a_limb_is_elsewhere() -> None:
+    some, none = {TOLD: np.array([0.0, 1.0])}, {TOLD: np.zeros(2)}
+    for memory in ({}, none):
+        assert [frame for frame in range(21) if is_asked(frame, 10, memory)] == [9, 19]
+        assert not any(is_asked(frame, 0, memory) for frame in range(21))
+    assert [frame for frame in range(9) if is_asked(frame, 10, some)] == [2, 5, 8]
+    assert all(is_asked(frame, 1, some) for frame in range(9))
+
+
+def test_nobody_is_asked_of_limbs_that_show_by_themselves() -> None:
+    teller, pictures = Told(BEFORE), {camera.name: np.zeros((1, 1, 3), np.uint8) for camera in CAMERAS}
+    shows, hidden = Elsewhere(0.0, 0.95, 0.5), Elsewhere(0.0, 0.95, 0.1)
+    for own, asked in ((shows, 0), (hidden, 1)):
+        known = {"left arm": own, "right arm": hidden}
+        told = limbs_told(teller, WRONG[0], pictures, known)
+        assert (teller.asked, set(told)) == (asked, {"left arm"} if asked else set())
+
+
+def test_how_far_a_limb_is_off_is_the_mean_of_its_markers_at_a_person_s_size() -> None:
+    places = marker_points(BODY, BEFORE[None])[0, ARM]
+    told = ToldLimb(0.0, ARM, places + np.array([[30.0, 0.0, 0.0], [0.0, 50.0, 0.0]]))
+    np.testing.assert_allclose(off_from(BODY, np.stack([BEFORE, BEFORE]), told), 40.0)
