@@ -46,10 +46,13 @@ from studio.search.trackers.told_limbs import (
     TOLD,
     LimbTeller,
     ToldLimb,
+    elsewhere_still,
     is_asked,
     limbs_told,
     missed,
+    not_asked,
     off_from,
+    told_memory,
 )
 from studio.search.trackers.tracker import (
     LIMB_LOST_SHARE,
@@ -213,7 +216,7 @@ class FrameRefiner:
                 rng, seen_frame.hypothesis(pose), seen_frame, result.carried.previous_estimate
             )
             pose, off = found.pose, found.off
-        asked = self._teller is not None and is_asked(result.frame, settings.ask_network_every, memory)
+        asked = self._teller is not None and is_asked(settings.ask_network_every, memory)
         changes: Mapping[str, Change] = (
             changes_of() if changes_of is not None and (witness.usable or asked) else {}
         )
@@ -272,30 +275,21 @@ class FrameRefiner:
             **certainty.moved,
             **colours.learnt(pose, views, elsewhere, memory),
         }
-        still = self._still_told(told, pose, certainty.limbs, memory)
-        memory[TOLD] = still
-        named = [limb for limb, one in zip(certainty.limbs, still, strict=True) if one]
+        if self._teller is not None:
+            limbs = certainty.limbs
+            memory[TOLD] = (
+                not_asked(limbs, memory) if told is None else told_memory(self._body, pose, limbs, told)
+            )
         return dataclasses.replace(
             result,
             estimate=estimate,
             carried=dataclasses.replace(carried, memory=memory),
             evaluations=result.evaluations + evaluations,
             disagreement=off.shares(),
-            limb_loss=certainty.lost(off, elsewhere, missed(named, elsewhere)),
+            limb_loss=certainty.lost(
+                off, elsewhere, missed(elsewhere_still(certainty.limbs, memory), elsewhere)
+            ),
         )
-
-    def _still_told(
-        self,
-        told: Mapping[str, ToldLimb] | None,
-        pose: Array,
-        limbs: Sequence[str],
-        memory: Mapping[str, Array],
-    ) -> Array:
-        """(G,) 1 for a limb that is told to be elsewhere than a pose has it, now or when it was last asked."""
-        if told is None:
-            return memory.get(TOLD, np.zeros(len(limbs)))
-        there = {limb: off_from(self._body, pose[None], one)[0] <= THERE_MM for limb, one in told.items()}
-        return np.array([float(limb in told and not there[limb]) for limb in limbs])
 
     def _made_for(
         self, names: tuple[str, ...], settings: RefinementSettings, redrawing: RefinementSettings

@@ -20,7 +20,7 @@ from studio.search.trackers.limbs_elsewhere import Elsewhere, is_shown
 from studio.search.trackers.tracker import MOVED
 
 TOLD = f"{MOVED}told"
-"""Memory: (G,) 1 for a limb that was last said to be elsewhere."""
+"""Memory: (1 + G,) frames since it was asked; 1 for each limb that was last said to be elsewhere."""
 SOONER = 3
 """Frames until it is asked again while a limb is said to be elsewhere."""
 THERE_MM = 120.0
@@ -49,12 +49,28 @@ class LimbTeller(Protocol):
         ...
 
 
-def is_asked(frame: int, every: int, memory: Mapping[str, Array]) -> bool:
+def is_asked(every: int, memory: Mapping[str, Array]) -> bool:
     """Whether it is asked in a frame. every : frames, 0 for never. memory : at the frame's start."""
-    if every <= 0:
-        return False
-    apart = min(every, SOONER) if memory.get(TOLD, np.zeros(1)).any() else every
-    return frame % apart == apart - 1
+    since, *elsewhere = memory.get(TOLD, np.zeros(1))
+    return 0 < (min(every, SOONER) if any(elsewhere) else every) <= since + 1.0
+
+
+def told_memory(body: BodyModel, pose: Array, limbs: Sequence[str], told: Mapping[str, ToldLimb]) -> Array:
+    """What is remembered (`TOLD`) of a frame in which it was asked and that ended with a pose (D,). limbs : all."""
+    there = {limb: off_from(body, pose[None], one)[0] <= THERE_MM for limb, one in told.items()}
+    return np.array([0.0, *(float(not there.get(limb, True)) for limb in limbs)])
+
+
+def not_asked(limbs: Sequence[str], memory: Mapping[str, Array]) -> Array:
+    """The same of a frame in which it was not. memory : at the frame's start."""
+    before = memory.get(TOLD, np.zeros(1 + len(limbs)))
+    return np.concatenate([before[:1] + 1.0, before[1:]])
+
+
+def elsewhere_still(limbs: Sequence[str], memory: Mapping[str, Array]) -> list[str]:
+    """Those of all limbs that were last told to be elsewhere and have not been found."""
+    known = memory.get(TOLD, np.zeros(1 + len(limbs)))[1:]
+    return [limb for limb, one in zip(limbs, known, strict=True) if one]
 
 
 def limbs_told(

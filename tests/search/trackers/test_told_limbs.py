@@ -12,15 +12,17 @@ from studio.body.forward_kinematics import marker_points
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.foundations.arrays import Array, Bytes
 from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
 from studio.search.trackers.limbs_elsewhere import Elsewhere, changes_by_camera
 from studio.search.trackers.told_limbs import TOLD, ToldLimb, is_asked, limbs_told, off_from
 from studio.search.trackers.tracker import Estimate, FrameResult, start_of
 
+LIMBS = np.zeros(len(dict.fromkeys(limb_names(BODY))))
 ARM = [row for row, marker in enumerate(BODY.markers) if marker.name in ("LElbow", "LWrist")]
 SETTINGS = FrameRefinementSettings(limb_colours=False, ask_network_every=5)
-ASKED = 4
-"""A frame in which it is asked every five."""
+DUE, SOON = {TOLD: np.array([4.0, *LIMBS])}, {TOLD: np.array([3.0, *LIMBS])}
+"""Memory where it is asked in the next frame, and in the one after that."""
 
 
 class Told:
@@ -38,14 +40,12 @@ class Told:
         return {"left arm": ToldLimb(float(apart), ARM, self.places)} if apart > 60.0 else {}
 
 
-def refined(
-    teller: Told, frame: int = ASKED, memory: Mapping[str, Array] | None = None, start: Array = WRONG[0]
-) -> FrameResult:
+def refined(teller: Told, memory: Mapping[str, Array] = DUE, start: Array = WRONG[0]) -> FrameResult:
     """The result of a frame whose search ended with the arm before the chest elsewhere than it is."""
     evidence, weighting = seen_in(BEFORE), WEIGHTINGS["edge-silhouette"]
-    state = dataclasses.replace(start_of(tuple(start.tolist())), memory=memory or {})
+    state = dataclasses.replace(start_of(tuple(start.tolist())), memory=memory)
     return FrameRefiner(BODY, CAMERAS, 5, teller).refined(
-        FrameResult(frame, Estimate(start, start, start, 0.0), 0, 0, 0, 0.0, state),
+        FrameResult(3, Estimate(start, start, start, 0.0), 0, 0, 0, 0.0, state),
         partial(silhouettes_by_camera, evidence),
         weighting.prepare(BODY, CAMERAS, weighting.settings_type()).problem(evidence),
         SETTINGS,
@@ -61,11 +61,12 @@ def arm_off(pose: Array) -> float:
 
 def test_a_limb_is_drawn_where_it_is_told_to_be_in_frames_in_which_that_is_asked() -> None:
     right = Told(BEFORE)
-    before, found = refined(right, ASKED - 1), refined(right)
+    before, found = refined(right, SOON), refined(right)
     assert right.asked == 1
     assert arm_off(before.estimate.pose) > 120.0 > 60.0 > arm_off(found.estimate.pose)
     assert "left arm" not in found.limbs_lost
     assert not found.carried.memory[TOLD].any()
+    assert before.carried.memory[TOLD][0] == 4.0
 
 
 def test_a_limb_that_the_silhouettes_deny_there_stays_and_is_named_until_it_is_found() -> None:
@@ -74,20 +75,24 @@ def test_a_limb_that_the_silhouettes_deny_there_stays_and_is_named_until_it_is_f
     assert arm_off(found.estimate.pose) > 100.0
     assert "left arm" in found.limbs_lost
     # Named also where it is not asked, and asked again sooner; then it is told to be where the pose has it.
-    later = refined(raised, ASKED + 2, found.carried.memory)
-    assert raised.asked == 1
-    assert "left arm" in later.limbs_lost
-    found_again = refined(Told(BEFORE), 8, later.carried.memory, BEFORE)
+    later = found
+    for asked in (1, 1, 2):
+        later = refined(raised, later.carried.memory)
+        assert raised.asked == asked
+        assert "left arm" in later.limbs_lost
+    found_again = refined(
+        Told(BEFORE), {TOLD: np.concatenate([[2.0], later.carried.memory[TOLD][1:]])}, BEFORE
+    )
     assert "left arm" not in found_again.limbs_lost
 
 
 def test_it_is_asked_every_few_frames_and_sooner_while_a_limb_is_elsewhere() -> None:
-    some, none = {TOLD: np.array([0.0, 1.0])}, {TOLD: np.zeros(2)}
-    for memory in ({}, none):
-        assert [frame for frame in range(21) if is_asked(frame, 10, memory)] == [9, 19]
-        assert not any(is_asked(frame, 0, memory) for frame in range(21))
-    assert [frame for frame in range(9) if is_asked(frame, 10, some)] == [2, 5, 8]
-    assert all(is_asked(frame, 1, some) for frame in range(9))
+    assert not is_asked(10, {})
+    assert is_asked(1, {})
+    for elsewhere, first in ((0.0, 9.0), (1.0, 2.0)):
+        asked = [since for since in range(12) if is_asked(10, {TOLD: np.array([since, 0.0, elsewhere])})]
+        assert asked[0] == first
+        assert not is_asked(0, {TOLD: np.array([99.0, 0.0, elsewhere])})
 
 
 def test_nobody_is_asked_of_limbs_that_show_by_themselves() -> None:

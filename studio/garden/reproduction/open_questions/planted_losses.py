@@ -9,6 +9,8 @@ long: no jump gives it away.
 - *three cameras*: the same, seen by the first three.
 - *mask erased*: the same, and the masks lack that limb in all views.
 - *too few evaluations*: nothing is planted; a run searches with 20 evaluations a frame, and loses limbs itself.
+
+In frames with planted losses the network that knows people is asked; a run asks it every ten frames.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -141,7 +143,7 @@ def plant(
         pose = whole.refined(truth, seen)
         if lost_limbs(body, pose, truth):
             continue
-        yield SOUND, "", whole.named(pose, seen, changed), whole.checked(pose, seen, changed, pictures)
+        yield SOUND, "", *whole.names(pose, seen, changed, pictures)
         rng = keyed_generator(seed, int(frame), 0, 0, KEY)
         for limb in whole.movable:
             draws = whole.drawn(rng, pose, limb)
@@ -160,12 +162,7 @@ def plant(
                     continue
                 ended = looking.refined(start, masks)
                 if limb in lost_limbs(body, ended, truth):
-                    yield (
-                        cause,
-                        limb,
-                        looking.named(ended, masks, changed),
-                        looking.checked(ended, masks, changed, pictures),
-                    )
+                    yield cause, limb, *looking.names(ended, masks, changed, pictures)
 
 
 def lost_limbs(body: BodyModel, pose: Array, truth: Array) -> set[str]:
@@ -215,31 +212,29 @@ class Looking:
         """(D,) a pose refined on the masks."""
         return self._refiner.refine(pose, seen).pose
 
-    def named(
-        self, pose: Array, seen: Sequence[SilhouetteDistances], changed: Sequence[Change]
-    ) -> tuple[str, ...]:
-        """The limbs that the detector calls lost, of a body that stood still for two frames."""
-        matrix = self._refiner.loss(pose, seen)[2]
-        certainty = self._certainty.of(pose, matrix, {})
-        for _ in range(2):
-            certainty = self._certainty.of(pose, matrix, certainty.moved)
-        elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
-        lost = certainty.lost(self._agreement.of(pose, seen), elsewhere)
-        return tuple(limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY)
-
-    def checked(
+    def names(
         self,
         pose: Array,
         seen: Sequence[SilhouetteDistances],
         changed: Sequence[Change],
         pictures: Mapping[str, Bytes],
-    ) -> tuple[str, ...]:
-        """The limbs that a check of the run calls contradicted. changed : as in `LimbsElsewhere.of`, of all cameras.
+    ) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The limbs that a run calls lost, of a body that stood still for two frames, in a frame in which it asks the
+        network; and those that a check calls contradicted. changed : as in `LimbsElsewhere.of`, of all cameras.
         pictures : of all cameras.
         """
-        elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
+        matrix = self._refiner.loss(pose, seen)[2]
+        certainty = self._certainty.of(pose, matrix, {})
+        for _ in range(2):
+            certainty = self._certainty.of(pose, matrix, certainty.moved)
+        off, elsewhere = (
+            self._agreement.of(pose, seen),
+            self._witness.of(pose, changed[: len(self.cameras)]),
+        )
         told = limbs_told(self._network, pose, pictures, elsewhere)
-        return tuple(contradicted_limbs(self._agreement.of(pose, seen), elsewhere, told))
+        lost = certainty.lost(off, elsewhere, told)
+        by_run = [limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY]
+        return tuple(by_run), tuple(contradicted_limbs(off, elsewhere, told))
 
     def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[Bytes]:
         """Each view's mask (H, W) without a limb of a pose, where no other limb of it lies."""
