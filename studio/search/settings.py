@@ -28,6 +28,7 @@ BEFORE: dict[str, Value] = {
     "refine_frames": False,
     "above_floor": False,
     "limb_colours": False,
+    "ask_network_every": 0,
     "mask_shadow_window": 1,
     "mask_shadow_floor": False,
     "mask_shadow_alike": 0.0,

@@ -8,7 +8,7 @@ show a limb elsewhere then (`limbs_elsewhere`), that limb is resampled on silhou
 shadows too, by the same rule, and the pose is taken if fewer limbs are elsewhere with it. Tried without gain: draws
 that are bent towards those places by inverse kinematics. Areas where something stands in front of the body are left out
 (`hidden_areas`). A limb before the body is in no silhouette: the colours that were learnt of it say where it is
-(`limb_colours`).
+(`limb_colours`), and of a person every few frames the network that knows people (`told_limbs`).
 """
 
 import dataclasses
