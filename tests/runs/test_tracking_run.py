@@ -1,5 +1,7 @@
 """A run that is stopped, killed, resumed or annealed again gives the same poses bit for bit."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 from toy_session import true_poses
@@ -8,11 +10,13 @@ from tracked_runs import abandon, finish, opened
 from studio.foundations.errors import NotFoundError, RunError, SettingsError
 from studio.foundations.progress import no_progress
 from studio.operations.jobs.batch import track_to_end
+from studio.runs import tracking_run
 from studio.runs.branching import prepare_branch
 from studio.runs.new_run import prepare_run
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
 from studio.search.settings import RunSettings, changed_settings
+from studio.search.trackers.told_limbs import ToldLimb
 from studio.search.trackers.tracker import LayerRecord
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
@@ -250,3 +254,32 @@ def test_progress_is_measured_over_frames(session_on_disk: Session) -> None:
         assert (progress.done, progress.total) == (2, 5)
         assert progress.frames_per_second > 0.0
         assert np.isnan(progress.seconds_left), "two frames foretell nothing"
+
+
+class Teller:
+    """Says that the arm is elsewhere than any pose has it; counts how often it is asked."""
+
+    def __init__(self, limb: str, markers: int) -> None:
+        self.limbs, self.asked = (limb,), 0
+        self._told = {limb: ToldLimb(900.0, (markers - 1,), np.array([[9e3, 0.0, 9e3]]))}
+
+    def lost(self, _pose: np.ndarray, pictures: Mapping[str, np.ndarray]) -> Mapping[str, ToldLimb]:
+        assert pictures
+        self.asked += 1
+        return self._told
+
+
+@pytest.mark.parametrize(("every", "in_frames"), [(2, [1, 3]), (0, [])])
+def test_somebody_who_knows_the_body_is_asked_where_its_limbs_are(
+    session_on_disk: Session, monkeypatch: pytest.MonkeyPatch, every: int, in_frames: list[int]
+) -> None:
+    run = new_run(session_on_disk, "asking", ask_network_every=every)
+    body = run.body()
+    teller = Teller(body.parameters[0].limb, len(body.markers))
+    monkeypatch.setattr(tracking_run, "LimbsByNetwork", lambda *_: teller)
+    finish(session_on_disk, run)
+    assert teller.asked == len(in_frames)
+    with run.results() as results:
+        named = [frame for frame in results.frames() if teller.limbs[0] in results.result(frame).limbs_lost]
+    # Named also where it is not asked, once it was said to be elsewhere.
+    assert named == ([frame for frame in range(5) if frame >= in_frames[0]] if in_frames else [])
