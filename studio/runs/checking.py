@@ -6,7 +6,7 @@ limbs (`jumps`), limbs contradicted by the masks (`search.trackers.agreement`), 
 """
 
 import contextlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -42,7 +42,7 @@ from studio.search.trackers.limbs_elsewhere import (
 )
 from studio.search.trackers.loss_detection import anything_seen
 from studio.search.trackers.start_candidates import facing
-from studio.search.trackers.told_limbs import limbs_told
+from studio.search.trackers.told_limbs import ToldLimb, limbs_told
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
@@ -286,12 +286,12 @@ def _contradicted(
 
 
 def contradicted_limbs(
-    off: Disagreement, elsewhere: Mapping[str, Elsewhere], told: Collection[str]
+    off: Disagreement, elsewhere: Mapping[str, Elsewhere], told: Mapping[str, ToldLimb]
 ) -> dict[str, tuple[float, bool]]:
     """By limb that masks or pictures contradict the share of its area that disagrees with the masks, and whether the
-    pictures do. off : of a pose. elsewhere : of `LimbsElsewhere`. told : limbs that the network sees elsewhere.
+    pictures do. off : of a pose. elsewhere : of `LimbsElsewhere`. told : of `limbs_told`.
     """
-    lost = {*lost_of(elsewhere), *told}
+    lost = {*lost_of(elsewhere), *(limb for limb, one in told.items() if one.is_sure)}
     return {
         limb: (round(share, 3), limb in lost)
         for limb, share in without_sure(off, elsewhere).shares().items()

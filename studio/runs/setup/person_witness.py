@@ -18,6 +18,7 @@ in a quarter of 134.
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,15 +38,15 @@ LIMB_JOINTS = ("Elbow", "Wrist", "Knee", "Ankle")
 """Joints that tell where a limb is, by the network and by our bodies' markers; all but those at the trunk."""
 TRUNK = ("Shoulder", "Hip")
 """Joints by which a picture shows that it is read right."""
-FAR_MM = 150.0
+FAR_MM = 100.0
 """mm at a person's size from which a joint is not where the network sees it."""
-AGREE, NEAR = 0.03, 0.06
-"""Shares of a crop's side within which pictures agree on a point, and within which one sees a joint where the pose has
-it: on a crop around a standing person 6 and 12 cm."""
+AGREE, USUAL = 0.03, 0.01
+"""Shares of a crop's side within which pictures agree on a point, and by which a point is usually off: on a crop around
+a standing person 6 and 2 cm."""
 READ = 0.05
 """Share of a crop's side by which TRUNK is off, on the mean, in a picture that counts."""
-MORE = 2
-"""Pictures that are more against a limb than for it."""
+FEWEST = 2
+"""Pictures from which a place is known."""
 
 
 class LimbsByNetwork:
@@ -55,7 +56,7 @@ class LimbsByNetwork:
 
     def __init__(self, body: BodyModel, cameras: Sequence[Camera]) -> None:
         names = [marker.name for marker in body.markers]
-        usable = len(cameras) >= MORE and all(
+        usable = len(cameras) >= FEWEST and all(
             f"{side}{joint}" in names for joint in (*TRUNK, *LIMB_JOINTS) for side in "LR"
         )
         self._body, self._cameras = body, {one.name: one for one in cameras}
@@ -82,23 +83,19 @@ class LimbsByNetwork:
         own = marker_points(self._body, pose[None])[0]
         trunk = own[self._trunk]
         seen = {name: one for name, one in seen.items() if self._is_read_right(name, one, trunk)}
-        off, places = dict.fromkeys(self.limbs, 0.0), {limb: dict[int, Array]() for limb in self.limbs}
-        if len(seen) < MORE:
+        if len(seen) < FEWEST:
             return {}
+        joints = {limb: list[_Joint]() for limb in self.limbs}
         for joint, rows, owners in zip(self._joints, self._rows, self._owners, strict=True):
-            for row, limb, (place, is_kept) in zip(
-                rows, owners, self._places(own[rows], PAIRS[joint], seen), strict=True
-            ):
-                if place is None:
-                    continue
-                places[limb][row] = place
-                if not is_kept:
-                    off[limb] = max(off[limb], float(np.linalg.norm(place - own[row])))
-        return {
-            limb: ToldLimb(away, tuple(places[limb]), np.array(list(places[limb].values())))
-            for limb, away in off.items()
-            if away > self._far
-        }
+            for limb, one in zip(owners, self._seen_joints(own, rows, PAIRS[joint], seen), strict=True):
+                joints[limb] += [] if one is None else [one]
+        lost = dict[str, ToldLimb]()
+        for limb, found in joints.items():
+            odds = max((one.odds for one in found if one.off > self._far), default=0.0)
+            if odds > 0.0:
+                markers, places = [one.marker for one in found], np.array([one.place for one in found])
+                lost[limb] = ToldLimb(max(one.off for one in found), odds, markers, places)
+        return lost
 
     def _is_read_right(self, camera: str, one: Detection, trunk: Array) -> bool:
         """Whether a picture shows the ends of shoulders and hips (4, 3) where the pose has them."""
@@ -112,25 +109,43 @@ class LimbsByNetwork:
             away += min(float(np.linalg.norm(way, axis=1).mean()) for way in ways) / len(TRUNK)
         return away < READ * one.next_crop.side
 
-    def _places(self, own: Array, pair: tuple[int, int], seen: Detections) -> list[tuple[Array | None, bool]]:
-        """Where a left and a right joint are (2 of (3,) mm; None where no two pictures agree on it), and whether as
-        many pictures see it where the pose has it, at `own` (2, 3). pair : the network's points.
+    def _seen_joints(
+        self, own: Array, markers: Sequence[int], pair: tuple[int, int], seen: Detections
+    ) -> list["_Joint | None"]:
+        """A left and a right joint as the pictures show them; None where no two pictures agree. own : (M, 3) the body's
+        markers. markers : the two joints' among them. pair : the network's points.
         """
-        shown, near = dict[str, Array](), dict[str, Array]()
+        shown, missed = dict[str, Array](), dict[str, Array]()
         for name, one in seen.items():
-            pixels, side = project(self._cameras[name], own)[0], one.next_crop.side
+            pixels = project(self._cameras[name], own[markers])[0]
             ways = [one.points[list(way)] for way in (pair, pair[::-1])]
-            away = [np.linalg.norm(way - pixels, axis=1) / side for way in ways]
+            away = [np.linalg.norm(way - pixels, axis=1) / one.next_crop.side for way in ways]
             best = int(np.argmin([each.sum() for each in away]))
-            shown[name], near[name] = ways[best], away[best] < NEAR
-        found: list[tuple[Array | None, bool]] = []
-        for row in range(len(own)):
+            shown[name], missed[name] = ways[best], away[best]
+        found = list[_Joint | None]()
+        for row, marker in enumerate(markers):
             rays = {name: points[row : row + 1] for name, points in shown.items()}
-            point = meeting_of(self._cameras, rays)
-            if point is None:
-                found.append((None, True))
+            place = meeting_of(self._cameras, rays)
+            agreed = 0
+            if place is not None:
+                place, agreed = of_those_that_agree(self._cameras, rays, seen, place, AGREE)
+            if place is None or not agreed:
+                found.append(None)
                 continue
-            point, against = of_those_that_agree(self._cameras, rays, seen, point, AGREE)
-            kept = against - sum(bool(one[row]) for one in near.values()) < MORE
-            found.append((point[0] if against else None, kept))
+            odds = 0.0
+            for name, ray in rays.items():
+                off = np.linalg.norm(project(self._cameras[name], place)[0] - ray) / seen[name].next_crop.side
+                odds += float(np.log1p((missed[name][row] / USUAL) ** 2) - np.log1p((off / USUAL) ** 2))
+            found.append(_Joint(marker, place[0], float(np.linalg.norm(place[0] - own[marker])), odds))
         return found
+
+
+class _Joint(NamedTuple):
+    """A joint as pictures show it. marker : the body's row. place : (3,) mm. off : mm, from where the pose has it.
+    odds : log odds that it is at the place rather than there.
+    """
+
+    marker: int
+    place: Array
+    off: float
+    odds: float

@@ -42,7 +42,7 @@ from studio.search.trackers.limbs_elsewhere import (
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import FLOOR_HELP, Distances, RefinementSettings, Refiner
 from studio.search.trackers.told_limbs import (
-    THERE_MM,
+    SURE_ODDS,
     TOLD,
     LimbTeller,
     ToldLimb,
@@ -93,9 +93,12 @@ DENIED, CONFIRMED = 0.25, 0.4
 """Shares of the expected gain. A limb that shows by itself is resampled if its colours should gain twice LEAST_GAIN
 and do not reach the first; only a pose that reaches the second is taken, with BETTER_CHAIN of the loss. Chosen on own
 start poses of *tiles*, in one of three of which a wrong arm stayed wrong (25.7 mm → 14.7)."""
-TOLD_SHARE, NEARER = 1.0, 0.6
-"""Share of the loss, and of how far a limb is from where it is told to be, up to which a pose is taken that has it
-there."""
+NEAREST = 200
+"""Of poses drawn of a limb so many that have it nearest to where it is told to be are compared with the silhouettes."""
+BELIEF, NEARER = 0.1, 0.6
+"""A pose is taken for its share of the loss, and this times its share of how far a limb is from where it is surely told
+to be, if they sum to 1 and this times the second at most: without a higher loss it must have the limb at NEARER of the
+distance."""
 DENIED_DRAWS, DENIED_REFINED = 4096, 16
 """Poses drawn of such a limb, which is far from where it belongs, and how many are refined."""
 REDRAWN = 0x11A6
@@ -129,7 +132,7 @@ class FrameRefinementSettings:
         help="Learn the colours of limbs, and resample one before the body where they say that it is not there.",
     )  # fmt: skip
     ask_network_every: int = next_frame_knob(
-        10, 0, 1000, 1, label="ask the network every", unit="frames",
+        5, 0, 1000, 1, label="ask the network every", unit="frames",
         help="How often the network that knows people is asked where limbs are that do not show; 0: never.",
     )  # fmt: skip
     above_floor: bool = next_frame_knob(True, label="stays above the floor", help=FLOOR_HELP)
@@ -457,8 +460,8 @@ def recoloured(
 def drawn_where_told(
     rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, told: Mapping[str, ToldLimb]
 ) -> tuple[Hypothesis, int]:
-    """The hypothesis with limbs where they are told to be, if the silhouettes agree with it as well, and the number of
-    poses compared.
+    """The hypothesis with limbs nearer to where they are told to be, if the silhouettes agree with it about as well,
+    and the number of poses compared.
     """
     evaluations, body = 0, frame.refiner.body
     for limb, one in told.items():
@@ -467,13 +470,16 @@ def drawn_where_told(
             continue
         drawn = _drawn(rng, frame.refiner, found.pose[None], own, DENIED_DRAWS)
         evaluations += len(drawn)
-        allowed, there = TOLD_SHARE * found.loss, float(off_from(body, found.pose[None], one)[0])
-        there = min(THERE_MM, NEARER * there)
-        for start in _best_apart(drawn, off_from(body, drawn, one), own, ALL_REFINED):
+        away, belief = off_from(body, found.pose[None], one)[0], BELIEF * min(one.odds / SURE_ODDS, 1.0)
+        nearest = drawn[np.argsort(off_from(body, drawn, one), kind="stable")[:NEAREST]]
+        disagreeing = frame.agreement.of_places(nearest, frame.silhouettes)
+        before, most = found.loss, 1.0 + NEARER * belief
+        for start in _best_apart(nearest, disagreeing, own, ALL_REFINED):
             pose = frame.refiner.refine(start, frame.silhouettes).pose
-            loss = frame.refiner.loss_with_pull(pose, frame.silhouettes)
-            if loss <= allowed and off_from(body, pose[None], one)[0] <= there:
-                found, allowed = frame.hypothesis(pose), min(allowed, loss)
+            share = frame.refiner.loss_with_pull(pose, frame.silhouettes) / before
+            cost = float(share + belief * off_from(body, pose[None], one)[0] / away)
+            if cost <= most:
+                found, most = frame.hypothesis(pose), cost
     return found, evaluations
 
 

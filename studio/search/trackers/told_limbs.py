@@ -20,22 +20,32 @@ from studio.search.trackers.limbs_elsewhere import Elsewhere, is_shown
 from studio.search.trackers.tracker import MOVED
 
 TOLD = f"{MOVED}told"
-"""Memory: (1 + G,) frames since it was asked; 1 for each limb that was last said to be elsewhere."""
+"""Memory: (1 + G,) frames since it was asked; 1 for each limb that was last said to be elsewhere, UNSURE if that was
+not sure."""
+UNSURE = 0.5
 SOONER = 3
 """Frames until it is asked again while a limb is said to be elsewhere."""
-THERE_MM = 120.0
+SURE_ODDS = 6.0
+"""Log odds from which a limb is named."""
+THERE_MM = 60.0
 """mm at a person's size: nearer, on the mean, a limb's markers are where they are told to be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ToldLimb:
-    """A limb that is elsewhere. off : mm, how far one of its joints is from where it is told to be, at most. markers :
-    (M,) rows of the body's markers on it. places : (M, 3) mm, where these are.
+    """A limb that is told to be elsewhere. off : mm, how far one of its joints is from there, at most. odds : log odds
+    that it is there. markers : (M,) rows of the body's markers on it. places : (M, 3) mm, where these are.
     """
 
     off: float
+    odds: float
     markers: Sequence[int]
     places: Array
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the limb is named as lost; a less sure one is looked for only."""
+        return self.odds >= SURE_ODDS
 
 
 class LimbTeller(Protocol):
@@ -50,15 +60,21 @@ class LimbTeller(Protocol):
 
 
 def is_asked(every: int, memory: Mapping[str, Array]) -> bool:
-    """Whether it is asked in a frame. every : frames, 0 for never. memory : at the frame's start."""
-    since, *elsewhere = memory.get(TOLD, np.zeros(1))
+    """Whether it is asked in a frame: in the first one, and then. every : frames, 0 for never. memory : at the frame's
+    start.
+    """
+    since, *elsewhere = memory.get(TOLD, [float(every)])
     return 0 < (min(every, SOONER) if any(elsewhere) else every) <= since + 1.0
 
 
 def told_memory(body: BodyModel, pose: Array, limbs: Sequence[str], told: Mapping[str, ToldLimb]) -> Array:
     """What is remembered (`TOLD`) of a frame in which it was asked and that ended with a pose (D,). limbs : all."""
-    there = {limb: off_from(body, pose[None], one)[0] <= THERE_MM for limb, one in told.items()}
-    return np.array([0.0, *(float(not there.get(limb, True)) for limb in limbs)])
+    away = {
+        limb: 1.0 if one.is_sure else UNSURE
+        for limb, one in told.items()
+        if off_from(body, pose[None], one)[0] > THERE_MM
+    }
+    return np.array([0.0, *(away.get(limb, 0.0) for limb in limbs)])
 
 
 def not_asked(limbs: Sequence[str], memory: Mapping[str, Array]) -> Array:
@@ -70,7 +86,7 @@ def not_asked(limbs: Sequence[str], memory: Mapping[str, Array]) -> Array:
 def elsewhere_still(limbs: Sequence[str], memory: Mapping[str, Array]) -> list[str]:
     """Those of all limbs that were last told to be elsewhere and have not been found."""
     known = memory.get(TOLD, np.zeros(1 + len(limbs)))[1:]
-    return [limb for limb, one in zip(limbs, known, strict=True) if one]
+    return [limb for limb, one in zip(limbs, known, strict=True) if one > UNSURE]
 
 
 def limbs_told(
