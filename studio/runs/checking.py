@@ -291,7 +291,7 @@ def contradicted_limbs(
     """By limb that masks or pictures contradict the share of its area that disagrees with the masks, and whether the
     pictures do. off : of a pose. elsewhere : of `LimbsElsewhere`. told : of `limbs_told`.
     """
-    lost = {*lost_of(elsewhere), *(limb for limb, one in told.items() if one.is_sure)}
+    lost = {*lost_of(elsewhere), *(limb for limb, one in told.items() if one.is_lost)}
     return {
         limb: (round(share, 3), limb in lost)
         for limb, share in without_sure(off, elsewhere).shares().items()

@@ -38,13 +38,15 @@ LIMB_JOINTS = ("Elbow", "Wrist", "Knee", "Ankle")
 """Joints that tell where a limb is, by the network and by our bodies' markers; all but those at the trunk."""
 TRUNK = ("Shoulder", "Hip")
 """Joints by which a picture shows that it is read right."""
-FAR_MM = 100.0
-"""mm at a person's size from which a joint is not where the network sees it."""
+OFF_MM, FAR_MM = 100.0, 150.0
+"""mm at a person's size from which a joint is not where the network sees it, and from which its limb is named."""
 AGREE, USUAL = 0.03, 0.01
 """Shares of a crop's side within which pictures agree on a point, and by which a point is usually off: on a crop around
 a standing person 6 and 2 cm."""
 READ = 0.05
 """Share of a crop's side by which TRUNK is off, on the mean, in a picture that counts."""
+LEAST_ODDS, SURE_ODDS = 1.0, 6.0
+"""Log odds from which a limb may be elsewhere, and from which it surely is."""
 FEWEST = 2
 """Pictures from which a place is known."""
 
@@ -60,7 +62,7 @@ class LimbsByNetwork:
             f"{side}{joint}" in names for joint in (*TRUNK, *LIMB_JOINTS) for side in "LR"
         )
         self._body, self._cameras = body, {one.name: one for one in cameras}
-        self._far, self._joints = FAR_MM * scale_of(body), LIMB_JOINTS if usable else ()
+        self._scale, self._joints = scale_of(body), LIMB_JOINTS if usable else ()
         self._rows = [[names.index(f"{side}{joint}") for side in "LR"] for joint in self._joints]
         self._trunk = [names.index(f"{side}{joint}") for joint in TRUNK for side in "LR"] if usable else []
         self._owners = [
@@ -91,10 +93,15 @@ class LimbsByNetwork:
                 joints[limb] += [] if one is None else [one]
         lost = dict[str, ToldLimb]()
         for limb, found in joints.items():
-            odds = max((one.odds for one in found if one.off > self._far), default=0.0)
-            if odds > 0.0:
+            odds = max((one.odds for one in found if one.off > self._scale * OFF_MM), default=0.0)
+            if odds > LEAST_ODDS:
                 markers, places = [one.marker for one in found], np.array([one.place for one in found])
-                lost[limb] = ToldLimb(max(one.off for one in found), odds, markers, places)
+                lost[limb] = ToldLimb(
+                    markers,
+                    places,
+                    min(odds / SURE_ODDS, 1.0),
+                    any(one.off > self._scale * FAR_MM and one.odds >= SURE_ODDS for one in found),
+                )
         return lost
 
     def _is_read_right(self, camera: str, one: Detection, trunk: Array) -> bool:

@@ -42,7 +42,7 @@ from studio.search.trackers.limbs_elsewhere import (
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import FLOOR_HELP, Distances, RefinementSettings, Refiner
 from studio.search.trackers.told_limbs import (
-    SURE_ODDS,
+    THERE_MM,
     TOLD,
     LimbTeller,
     ToldLimb,
@@ -96,9 +96,10 @@ start poses of *tiles*, in one of three of which a wrong arm stayed wrong (25.7 
 NEAREST = 200
 """Of poses drawn of a limb so many that have it nearest to where it is told to be are compared with the silhouettes."""
 BELIEF, NEARER = 0.1, 0.6
-"""A pose is taken for its share of the loss, and this times its share of how far a limb is from where it is surely told
-to be, if they sum to 1 and this times the second at most: without a higher loss it must have the limb at NEARER of the
-distance."""
+"""A pose is taken for its share of the loss, and BELIEF times its share of how far a limb is from where it is surely
+told to be, if they sum to 1 + BELIEF · NEARER at most: without a higher loss it must have the limb at NEARER of the
+distance. One that has not come to where it is told to be must have BETTER_CHAIN of the loss, too: before the body a
+limb is as well everywhere."""
 DENIED_DRAWS, DENIED_REFINED = 4096, 16
 """Poses drawn of such a limb, which is far from where it belongs, and how many are refined."""
 REDRAWN = 0x11A6
@@ -470,15 +471,16 @@ def drawn_where_told(
             continue
         drawn = _drawn(rng, frame.refiner, found.pose[None], own, DENIED_DRAWS)
         evaluations += len(drawn)
-        away, belief = off_from(body, found.pose[None], one)[0], BELIEF * min(one.odds / SURE_ODDS, 1.0)
+        away, belief = off_from(body, found.pose[None], one)[0], BELIEF * one.belief
         nearest = drawn[np.argsort(off_from(body, drawn, one), kind="stable")[:NEAREST]]
         disagreeing = frame.agreement.of_places(nearest, frame.silhouettes)
         before, most = found.loss, 1.0 + NEARER * belief
         for start in _best_apart(nearest, disagreeing, own, ALL_REFINED):
             pose = frame.refiner.refine(start, frame.silhouettes).pose
             share = frame.refiner.loss_with_pull(pose, frame.silhouettes) / before
-            cost = float(share + belief * off_from(body, pose[None], one)[0] / away)
-            if cost <= most:
+            off = off_from(body, pose[None], one)[0]
+            cost = float(share + belief * off / away)
+            if cost <= most and (off <= THERE_MM or share <= BETTER_CHAIN):
                 found, most = frame.hypothesis(pose), cost
     return found, evaluations
 

@@ -25,27 +25,21 @@ not sure."""
 UNSURE = 0.5
 SOONER = 3
 """Frames until it is asked again while a limb is said to be elsewhere."""
-SURE_ODDS = 6.0
-"""Log odds from which a limb is named."""
-THERE_MM = 60.0
+THERE_MM = 80.0
 """mm at a person's size: nearer, on the mean, a limb's markers are where they are told to be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ToldLimb:
-    """A limb that is told to be elsewhere. off : mm, how far one of its joints is from there, at most. odds : log odds
-    that it is there. markers : (M,) rows of the body's markers on it. places : (M, 3) mm, where these are.
+    """A limb that is told to be elsewhere. markers : (M,) rows of the body's markers on it. places : (M, 3) mm, where
+    these are. belief : 0 to 1, in that. is_lost : whether it is so far from there, and that so sure, that it is named;
+    any other is looked for only.
     """
 
-    off: float
-    odds: float
     markers: Sequence[int]
     places: Array
-
-    @property
-    def is_sure(self) -> bool:
-        """Whether the limb is named as lost; a less sure one is looked for only."""
-        return self.odds >= SURE_ODDS
+    belief: float = 1.0
+    is_lost: bool = True
 
 
 class LimbTeller(Protocol):
@@ -70,7 +64,7 @@ def is_asked(every: int, memory: Mapping[str, Array]) -> bool:
 def told_memory(body: BodyModel, pose: Array, limbs: Sequence[str], told: Mapping[str, ToldLimb]) -> Array:
     """What is remembered (`TOLD`) of a frame in which it was asked and that ended with a pose (D,). limbs : all."""
     away = {
-        limb: 1.0 if one.is_sure else UNSURE
+        limb: 1.0 if one.is_lost else UNSURE
         for limb, one in told.items()
         if off_from(body, pose[None], one)[0] > THERE_MM
     }

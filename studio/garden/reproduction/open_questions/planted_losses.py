@@ -232,7 +232,7 @@ class Looking:
             self._witness.of(pose, changed[: len(self.cameras)]),
         )
         told = limbs_told(self._network, pose, pictures, elsewhere)
-        lost = certainty.lost(off, elsewhere, [limb for limb, one in told.items() if one.is_sure])
+        lost = certainty.lost(off, elsewhere, [limb for limb, one in told.items() if one.is_lost])
         by_run = [limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY]
         return tuple(by_run), tuple(contradicted_limbs(off, elsewhere, told))
 
