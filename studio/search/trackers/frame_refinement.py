@@ -474,13 +474,13 @@ def drawn_where_told(
         away, belief = off_from(body, found.pose[None], one)[0], BELIEF * one.belief
         nearest = drawn[np.argsort(off_from(body, drawn, one), kind="stable")[:NEAREST]]
         disagreeing = frame.agreement.of_places(nearest, frame.silhouettes)
-        before, most = found.loss, 1.0 + NEARER * belief
+        before, most = found.loss, found.loss * (1.0 + NEARER * belief)
         for start in _best_apart(nearest, disagreeing, own, ALL_REFINED):
             pose = frame.refiner.refine(start, frame.silhouettes).pose
-            share = frame.refiner.loss_with_pull(pose, frame.silhouettes) / before
+            loss = frame.refiner.loss_with_pull(pose, frame.silhouettes)
             off = off_from(body, pose[None], one)[0]
-            cost = float(share + belief * off / away)
-            if cost <= most and (off <= THERE_MM or share <= BETTER_CHAIN):
+            cost = float(loss + before * belief * off / away)
+            if cost <= most and (off <= THERE_MM or loss <= BETTER_CHAIN * before):
                 found, most = frame.hypothesis(pose), cost
     return found, evaluations
 

@@ -10,7 +10,7 @@ long: no jump gives it away.
 - *mask erased*: the same, and the masks lack that limb in all views.
 - *too few evaluations*: nothing is planted; a run searches with 20 evaluations a frame, and loses limbs itself.
 
-In frames with planted losses the network that knows people is asked; a run asks it every ten frames.
+In frames with planted losses the network that knows people is asked; a run asks it every five frames.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
