@@ -1,9 +1,10 @@
 """Limbs of which somebody tells where they are: who knows the body from elsewhere, as a network knows people.
 
-Asking takes long, so it is done every few frames, in none where all of the body's limbs show by themselves, and sooner
-again while a limb is said to be elsewhere. There the limb is drawn over its whole range, the draws are ranked by how
-near their markers come to the places told, the best are refined on the silhouettes, and the pose is kept if its markers
-then are where they are told to be and the silhouettes agree with it as well as before.
+Asking takes long, so it is done in a run's first frame and every few frames, not where all limbs show by themselves,
+and sooner again while one is said to be elsewhere. Such a limb is drawn over its whole range
+(`frame_refinement.drawn_where_told`); of the draws whose markers come nearest to the places told those that the
+silhouettes deny least are refined. One is kept if its markers then are where they are told to be and the silhouettes
+agree with it about as well as before, or if it is nearer and they agree clearly better.
 """
 
 from collections.abc import Collection, Mapping, Sequence
