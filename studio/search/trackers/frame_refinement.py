@@ -182,7 +182,7 @@ class FrameRefiner:
         self, body: BodyModel, cameras: tuple[Camera, ...], seed: int, teller: LimbTeller | None = None
     ) -> None:
         self._body, self._cameras = body, {camera.name: camera for camera in cameras}
-        self._seed, self._teller = seed, teller
+        self._seed, self._teller = seed, teller if teller is not None and teller.limbs else None
         self._prepared = functools.cache(self._made_for)
 
     def refined(
