@@ -44,7 +44,7 @@ AGREE, USUAL = 0.03, 0.01
 a standing person 6 and 2 cm."""
 READ = 0.05
 """Share of a crop's side by which TRUNK is off, on the mean, in a picture that counts."""
-LEAST_ODDS, SURE_ODDS = 1.0, 6.0
+LEAST_ODDS, SURE_ODDS = 3.0, 6.0
 """Log odds from which a limb may be elsewhere, and from which it surely is."""
 FEWEST = 2
 """Pictures from which a place is known."""

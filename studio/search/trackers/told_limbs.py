@@ -1,7 +1,7 @@
 """Limbs of which somebody tells where they are: who knows the body from elsewhere, as a network knows people.
 
 Asking takes long, so it is done in a run's first frame and every few frames, not where all limbs show by themselves,
-and sooner again while one is said to be elsewhere. Such a limb is drawn over its whole range
+and sooner again while one is said to be lost. A limb that is elsewhere is drawn over its whole range
 (`frame_refinement.drawn_where_told`); of the draws whose markers come nearest to the places told those that the
 silhouettes deny least are refined. One is kept if its markers then are where they are told to be and the silhouettes
 agree with it about as well as before, or if it is nearer and they agree clearly better.
@@ -21,11 +21,9 @@ from studio.search.trackers.limbs_elsewhere import Elsewhere, is_shown
 from studio.search.trackers.tracker import MOVED
 
 TOLD = f"{MOVED}told"
-"""Memory: (1 + G,) frames since it was asked; 1 for each limb that was last said to be elsewhere, UNSURE if that was
-not sure."""
-UNSURE = 0.5
+"""Memory: (1 + G,) frames since it was asked; 1 for each limb that was last said to be lost."""
 SOONER = 3
-"""Frames until it is asked again while a limb is said to be elsewhere."""
+"""Frames until it is asked again while a limb is said to be lost."""
 THERE_MM = 80.0
 """mm at a person's size: nearer, on the mean, a limb's markers are where they are told to be."""
 
@@ -64,12 +62,10 @@ def is_asked(every: int, memory: Mapping[str, Array]) -> bool:
 
 def told_memory(body: BodyModel, pose: Array, limbs: Sequence[str], told: Mapping[str, ToldLimb]) -> Array:
     """What is remembered (`TOLD`) of a frame in which it was asked and that ended with a pose (D,). limbs : all."""
-    away = {
-        limb: 1.0 if one.is_lost else UNSURE
-        for limb, one in told.items()
-        if off_from(body, pose[None], one)[0] > THERE_MM
+    lost = {
+        limb for limb, one in told.items() if one.is_lost and off_from(body, pose[None], one)[0] > THERE_MM
     }
-    return np.array([0.0, *(away.get(limb, 0.0) for limb in limbs)])
+    return np.array([0.0, *(float(limb in lost) for limb in limbs)])
 
 
 def not_asked(limbs: Sequence[str], memory: Mapping[str, Array]) -> Array:
@@ -79,9 +75,9 @@ def not_asked(limbs: Sequence[str], memory: Mapping[str, Array]) -> Array:
 
 
 def elsewhere_still(limbs: Sequence[str], memory: Mapping[str, Array]) -> list[str]:
-    """Those of all limbs that were last told to be elsewhere and have not been found."""
+    """Those of all limbs that were last said to be lost and have not been found."""
     known = memory.get(TOLD, np.zeros(1 + len(limbs)))[1:]
-    return [limb for limb, one in zip(limbs, known, strict=True) if one > UNSURE]
+    return [limb for limb, one in zip(limbs, known, strict=True) if one]
 
 
 def limbs_told(
