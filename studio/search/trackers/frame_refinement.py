@@ -134,7 +134,7 @@ class FrameRefinementSettings:
     )  # fmt: skip
     ask_network_every: int = next_frame_knob(
         5, 0, 1000, 1, label="ask the network every", unit="frames",
-        help="How often the network that knows people is asked where limbs are that do not show; 0: never.",
+        help="How often the network that knows people is asked where an arm is that does not show; 0: never.",
     )  # fmt: skip
     above_floor: bool = next_frame_knob(True, label="stays above the floor", help=FLOOR_HELP)
     refined_spread: float = next_frame_knob(
