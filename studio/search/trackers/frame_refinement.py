@@ -175,7 +175,7 @@ class SilhouettesOf(Protocol):
 
 class FrameRefiner:
     """Refines the frames of one body; what is prepared for some cameras is kept. seed : of the run. teller : tells
-    where limbs are; None: nobody does.
+    where limbs are; None: there is no teller.
     """
 
     def __init__(

@@ -86,7 +86,7 @@ class Certainty:
         told: Collection[str] = (),
     ) -> dict[str, float]:
         """By limb the probability that it is lost. off : the pose's disagreement with the silhouettes. pictures : by
-        limb what changed in them, if that is known. told : limbs that somebody tells to be elsewhere (`told_limbs`).
+        limb what changed in them, if that is known. told : limbs that are told to be elsewhere (`told_limbs`).
         """
         known = pictures or {}
         signs, bare = self.signs(without_sure(off, known), known)

@@ -1,4 +1,4 @@
-"""Limbs of which somebody tells where they are: who knows the body from elsewhere, as a network knows people.
+"""Limbs whose place a source beside the silhouettes tells, as a network does that knows people.
 
 Asking takes long, so it is done in a run's first frame and every few frames, not where all limbs show by themselves,
 and sooner again while one is said to be lost. A limb that is elsewhere is drawn over its whole range
@@ -83,8 +83,8 @@ def elsewhere_still(limbs: Sequence[str], memory: Mapping[str, Array]) -> list[s
 def limbs_told(
     teller: LimbTeller, pose: Array, pictures: Mapping[str, Bytes], shown: Mapping[str, Elsewhere]
 ) -> dict[str, ToldLimb]:
-    """The limbs of a pose (D,) that are told to be elsewhere and do not show by themselves where it has them; nobody is
-    asked where all show. pictures : (H, W, 3), BGR, by camera. shown : by limb how it shows in them.
+    """The limbs of a pose (D,) that are told to be elsewhere and do not show by themselves where it has them; the
+    teller is not asked where all show. pictures : (H, W, 3), BGR, by camera. shown : by limb how it shows in them.
     """
     if not missed(teller.limbs, shown):
         return {}
@@ -93,8 +93,8 @@ def limbs_told(
 
 
 def missed(limbs: Collection[str], shown: Mapping[str, Elsewhere]) -> list[str]:
-    """Of limbs that are said to be elsewhere those that do not show by themselves where the pose has them: a leg that
-    is kicked high explains what changed there, whatever is said of it.
+    """Of limbs that are said to be elsewhere those that do not show by themselves where the pose has them: an arm that
+    is held out explains what changed there, whatever is said of it.
     """
     return [limb for limb in limbs if limb not in shown or not is_shown(shown[limb])]
 

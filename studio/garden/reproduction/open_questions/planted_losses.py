@@ -227,10 +227,8 @@ class Looking:
         certainty = self._certainty.of(pose, matrix, {})
         for _ in range(2):
             certainty = self._certainty.of(pose, matrix, certainty.moved)
-        off, elsewhere = (
-            self._agreement.of(pose, seen),
-            self._witness.of(pose, changed[: len(self.cameras)]),
-        )
+        off = self._agreement.of(pose, seen)
+        elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
         told = limbs_told(self._network, pose, pictures, elsewhere)
         lost = certainty.lost(off, elsewhere, [limb for limb, one in told.items() if one.is_lost])
         by_run = [limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY]
