@@ -6,7 +6,7 @@ limbs (`jumps`), limbs contradicted by the masks (`search.trackers.agreement`), 
 """
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -41,8 +41,8 @@ from studio.search.trackers.limbs_elsewhere import (
     without_sure,
 )
 from studio.search.trackers.loss_detection import anything_seen
+from studio.search.trackers.reported_limbs import reported_limbs, reported_lost
 from studio.search.trackers.start_candidates import facing
-from studio.search.trackers.told_limbs import ToldLimb, limbs_told
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
@@ -213,10 +213,10 @@ def check_run(
                 if witness.usable:
                     elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
                 pictures = {view.camera: view.picture for view in evidence.views}
-                told = limbs_told(network, pose, pictures, elsewhere)
+                reported = reported_lost(body, pose, reported_limbs(network, pose, pictures, elsewhere))
                 contradicted += [
                     ContradictedLimb(frame, limb, *found)
-                    for limb, found in contradicted_limbs(off, elsewhere, told).items()
+                    for limb, found in contradicted_limbs(off, elsewhere, reported).items()
                 ]
     check = RunCheck(
         track=chosen.name,
@@ -286,12 +286,12 @@ def _contradicted(
 
 
 def contradicted_limbs(
-    off: Disagreement, elsewhere: Mapping[str, Elsewhere], told: Mapping[str, ToldLimb]
+    off: Disagreement, elsewhere: Mapping[str, Elsewhere], reported: Collection[str]
 ) -> dict[str, tuple[float, bool]]:
     """By limb that masks or pictures contradict the share of its area that disagrees with the masks, and whether the
-    pictures do. off : of a pose. elsewhere : of `LimbsElsewhere`. told : of `limbs_told`.
+    pictures do. off : of a pose. elsewhere : of `LimbsElsewhere`. reported : of `reported_lost`.
     """
-    lost = {*lost_of(elsewhere), *(limb for limb, one in told.items() if one.is_lost)}
+    lost = {*lost_of(elsewhere), *reported}
     return {
         limb: (round(share, 3), limb in lost)
         for limb, share in without_sure(off, elsewhere).shares().items()

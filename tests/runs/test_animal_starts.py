@@ -23,8 +23,8 @@ from studio.runs.setup.initialising import (
     whole_problem,
 )
 from studio.search.settings import changed_settings, default_settings
-from studio.search.trackers.frame_refinement import Hypothesis, has_tail, turned_pose
 from studio.search.trackers.initialisation import QUICK, FoundStart
+from studio.search.trackers.limb_resampling import Hypothesis, has_tail, turned_pose
 from studio.search.trackers.start_candidates import facing
 
 CAMERAS = tuple(

@@ -13,7 +13,7 @@ from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouette_distances
 from studio.runs.setup.initial_limbs import limbs_put_right
 from studio.search.trackers.agreement import Agreement
-from studio.search.trackers.frame_refinement import SeenFrame, drawn_along, turned_pose
+from studio.search.trackers.limb_resampling import SeenFrame, drawn_along, turned_pose
 from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 

@@ -15,7 +15,7 @@ from studio.foundations.geometry.projection import project
 from studio.runs.setup import person_witness
 from studio.runs.setup.person_landmarks import PAIRS
 from studio.runs.setup.person_witness import LimbsByNetwork
-from studio.search.trackers.told_limbs import ToldLimb
+from studio.search.trackers.reported_limbs import ReportedLimb
 
 BODY = load_body("human35")
 CAMERAS = tuple(ring_of_cameras(4))
@@ -41,7 +41,7 @@ def lost(
     pose: Array,
     shown: Mapping[str, Array],
     exchanged: Collection[str] = (),
-) -> dict[str, ToldLimb]:
+) -> dict[str, ReportedLimb]:
     """Limbs of a pose (D,) that are lost where cameras show people with markers (M, 3)."""
     by_name = {camera.name: camera for camera in CAMERAS}
     found = {name: seen(by_name[name], places, name in exchanged) for name, places in shown.items()}
@@ -50,7 +50,7 @@ def lost(
         return found
 
     monkeypatch.setattr(person_witness, "person_around", around)
-    return LimbsByNetwork(BODY, CAMERAS).lost(pose, {})
+    return LimbsByNetwork(BODY, CAMERAS).elsewhere(pose, {})
 
 
 def standing(**degrees: float) -> Array:
@@ -108,4 +108,3 @@ def test_only_people_seen_from_two_sides_are_asked_for() -> None:
     assert LimbsByNetwork(BODY, CAMERAS).limbs == ("left arm", "right arm")
     for nobody in (LimbsByNetwork(BODY, CAMERAS[:1]), LimbsByNetwork(load_body("mouse31"), CAMERAS)):
         assert nobody.limbs == ()
-        assert nobody.lost(BODY.neutral, {}) == {}

@@ -16,7 +16,7 @@ from studio.runs.new_run import prepare_run
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
 from studio.search.settings import RunSettings, changed_settings
-from studio.search.trackers.told_limbs import ToldLimb
+from studio.search.trackers.reported_limbs import ReportedLimb
 from studio.search.trackers.tracker import LayerRecord
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
@@ -256,30 +256,30 @@ def test_progress_is_measured_over_frames(session_on_disk: Session) -> None:
         assert np.isnan(progress.seconds_left), "two frames foretell nothing"
 
 
-class Teller:
-    """Says that the arm is elsewhere than any pose has it; counts how often it is asked."""
+class Source:
+    """Reports the arm elsewhere than any pose has it; counts how often it is asked."""
 
     def __init__(self, limb: str, markers: int) -> None:
         self.limbs, self.asked = (limb,), 0
-        self._told = {limb: ToldLimb((markers - 1,), np.array([[9e3, 0.0, 9e3]]))}
+        self._reported = {limb: ReportedLimb((markers - 1,), np.array([[9e3, 0.0, 9e3]]))}
 
-    def lost(self, _pose: np.ndarray, pictures: Mapping[str, np.ndarray]) -> Mapping[str, ToldLimb]:
+    def elsewhere(self, _pose: np.ndarray, pictures: Mapping[str, np.ndarray]) -> Mapping[str, ReportedLimb]:
         assert pictures
         self.asked += 1
-        return self._told
+        return self._reported
 
 
 @pytest.mark.parametrize(("every", "in_frames"), [(2, [0, 2, 4]), (0, [])])
-def test_somebody_who_knows_the_body_is_asked_where_its_limbs_are(
+def test_the_network_is_asked_where_limbs_are(
     session_on_disk: Session, monkeypatch: pytest.MonkeyPatch, every: int, in_frames: list[int]
 ) -> None:
     run = new_run(session_on_disk, "asking", ask_network_every=every)
     body = run.body()
-    teller = Teller(body.parameters[0].limb, len(body.markers))
-    monkeypatch.setattr(tracking_run, "LimbsByNetwork", lambda *_: teller)
+    source = Source(body.parameters[0].limb, len(body.markers))
+    monkeypatch.setattr(tracking_run, "LimbsByNetwork", lambda *_: source)
     finish(session_on_disk, run)
-    assert teller.asked == len(in_frames)
+    assert source.asked == len(in_frames)
     with run.results() as results:
-        named = [frame for frame in results.frames() if teller.limbs[0] in results.result(frame).limbs_lost]
+        named = [frame for frame in results.frames() if source.limbs[0] in results.result(frame).limbs_lost]
     # Named also where it is not asked, once it was said to be elsewhere.
     assert named == ([frame for frame in range(5) if frame >= in_frames[0]] if in_frames else [])

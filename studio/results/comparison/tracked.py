@@ -200,10 +200,10 @@ def track_seeds(
 
         return note
 
-    teller = LimbsByNetwork(body, seen_with)
+    source = LimbsByNetwork(body, seen_with)
     runs = [
         Following(
-            settings, space, start_of(start), seed, FrameRefiner(body, seen_with, seed, teller), noting(own)
+            settings, space, start_of(start), seed, FrameRefiner(body, seen_with, seed, source), noting(own)
         )
         for seed, own in zip(seeds, evidences, strict=True)
     ]

@@ -23,14 +23,8 @@ from studio.foundations.errors import StudioError
 from studio.results.evaluation.errors import TRUNK, has_sides, limb_of_markers, rows_of_frames
 from studio.results.inspection.reading import InspectedRun
 from studio.search.trackers.agreement import Agreement
-from studio.search.trackers.frame_refinement import (
-    DOUBTFUL_SHARE,
-    REDRAWN,
-    REDRAWN_STEPS,
-    FrameRefinementSettings,
-    SeenFrame,
-    redrawn,
-)
+from studio.search.trackers.frame_refinement import REDRAWN, REDRAWN_STEPS, FrameRefinementSettings
+from studio.search.trackers.limb_resampling import DOUBTFUL_SHARE, SeenFrame, redrawn
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.side_exchange import kinds_of
 

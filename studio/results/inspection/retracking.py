@@ -59,8 +59,8 @@ class Retracking:
         carried = self._carried if start is None else _state_at(start, self._carried)
         seed = self.run.run.record.seed + change.seed
         body, cameras = self.run.body, self._source.cameras
-        teller = None if self.run.run.record.live else LimbsByNetwork(body, cameras)
-        refiner = FrameRefiner(body, cameras, seed, teller)
+        source = None if self.run.run.record.live else LimbsByNetwork(body, cameras)
+        refiner = FrameRefiner(body, cameras, seed, source)
         results: list[FrameResult] = []
         for frame in self.frames:
             stop_if_left()

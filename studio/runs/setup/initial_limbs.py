@@ -17,7 +17,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import Agreement
-from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, has_tail, redraw_all, redrawn
+from studio.search.trackers.limb_resampling import Hypothesis, SeenFrame, has_tail, redraw_all, redrawn
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 
 ROUNDS = 3

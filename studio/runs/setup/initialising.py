@@ -39,7 +39,6 @@ from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.devices import CPU
 from studio.search.likelihood.mesh_silhouettes import MeshSilhouettes
 from studio.search.settings import DEFAULT_TRACKER, RunSettings, changed_settings
-from studio.search.trackers.frame_refinement import Hypothesis, has_tail
 from studio.search.trackers.initialisation import (
     PER_FAMILY,
     THOROUGH,
@@ -49,6 +48,7 @@ from studio.search.trackers.initialisation import (
     confidence,
     facing_odds,
 )
+from studio.search.trackers.limb_resampling import Hypothesis, has_tail
 from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.start_candidates import facing, start_candidates
 from studio.search.trackers.tracker import LIMB_LOST_SHARE, FrameLikelihood, SearchSpace

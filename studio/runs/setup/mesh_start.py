@@ -18,8 +18,8 @@ from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress
 from studio.search.likelihood.mesh_silhouettes import MeshSilhouettes
 from studio.search.trackers.agreement import Agreement
-from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame
 from studio.search.trackers.initialisation import Effort
+from studio.search.trackers.limb_resampling import Hypothesis, SeenFrame
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.start_lines import Round
 

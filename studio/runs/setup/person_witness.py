@@ -32,7 +32,7 @@ from studio.foundations.geometry.projection import project
 from studio.runs.setup.person_facing import person_around
 from studio.runs.setup.person_landmarks import PAIRS, meeting_of, of_those_that_agree
 from studio.runs.setup.person_masks import Detections
-from studio.search.trackers.told_limbs import ToldLimb
+from studio.search.trackers.reported_limbs import ReportedLimb
 
 LIMB_JOINTS = ("Elbow", "Wrist")
 """Joints that tell where a limb is, by the network and by our bodies' markers."""
@@ -52,8 +52,9 @@ FEWEST = 2
 
 
 class LimbsByNetwork:
-    """Asks the network where a person's limbs are (`search.trackers.told_limbs.LimbTeller`). limbs : of which it knows;
-    none for bodies whose markers are no person's.
+    """Asks the network where a person's limbs are (`search.trackers.reported_limbs.LimbSource`).
+
+    limbs : of which it knows; none for bodies whose markers are no person's.
     """
 
     def __init__(self, body: BodyModel, cameras: Sequence[Camera]) -> None:
@@ -74,12 +75,10 @@ class LimbsByNetwork:
     def _network(self) -> PersonNetwork:
         return PersonNetwork()
 
-    def lost(self, pose: Array, pictures: Mapping[str, Bytes]) -> dict[str, ToldLimb]:
+    def elsewhere(self, pose: Array, pictures: Mapping[str, Bytes]) -> dict[str, ReportedLimb]:
         """The limbs of a pose (D,) that are not where the network sees them, with all of their joints that it sees.
         pictures : (H, W, 3), BGR, by camera.
         """
-        if not self.limbs:
-            return {}
         around = joint_frames(self._body, pose)[0, :, :, 3]
         seen = person_around(self._network, tuple(self._cameras.values()), pictures, around)
         own = marker_points(self._body, pose[None])[0]
@@ -91,18 +90,18 @@ class LimbsByNetwork:
         for joint, rows, owners in zip(self._joints, self._rows, self._owners, strict=True):
             for limb, one in zip(owners, self._seen_joints(own, rows, PAIRS[joint], seen), strict=True):
                 joints[limb] += [] if one is None else [one]
-        lost = dict[str, ToldLimb]()
+        away = dict[str, ReportedLimb]()
         for limb, found in joints.items():
             odds = max((one.odds for one in found if one.off > self._scale * OFF_MM), default=0.0)
             if odds > LEAST_ODDS:
                 markers, places = [one.marker for one in found], np.array([one.place for one in found])
-                lost[limb] = ToldLimb(
+                away[limb] = ReportedLimb(
                     markers,
                     places,
                     min(odds / SURE_ODDS, 1.0),
                     any(one.off > self._scale * FAR_MM and one.odds >= SURE_ODDS for one in found),
                 )
-        return lost
+        return away
 
     def _is_read_right(self, camera: str, one: Detection, trunk: Array) -> bool:
         """Whether a picture shows the ends of shoulders and hips (4, 3) where the pose has them."""

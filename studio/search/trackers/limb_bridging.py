@@ -26,7 +26,7 @@ from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress, counting, no_progress
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
-from studio.search.trackers.frame_refinement import bent_by
+from studio.search.trackers.limb_resampling import bent_by
 from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.side_exchange import (
     MOST_SHARE,

@@ -83,15 +83,15 @@ class Certainty:
         self,
         off: Disagreement,
         pictures: Mapping[str, Elsewhere] | None = None,
-        told: Collection[str] = (),
+        reported: Collection[str] = (),
     ) -> dict[str, float]:
         """By limb the probability that it is lost. off : the pose's disagreement with the silhouettes. pictures : by
-        limb what changed in them, if that is known. told : limbs that are told to be elsewhere (`told_limbs`).
+        limb what changed in them, if that is known. reported : limbs that are reported lost (`reported_limbs`).
         """
         known = pictures or {}
         signs, bare = self.signs(without_sure(off, known), known)
         odds = np.where(bare > LIMB_LOST_SHARE, np.inf, CONSTANT + signs @ WEIGHTS)
-        elsewhere = {*lost_of(known), *told}
+        elsewhere = {*lost_of(known), *reported}
         odds = np.where([limb in elsewhere for limb in self.limbs], np.maximum(odds, WITNESSED), odds)
         return dict(zip(self.limbs, (1.0 / (1.0 + np.exp(-odds))).tolist(), strict=True))
 

@@ -41,8 +41,8 @@ from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress, counting, no_progress
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
-from studio.search.trackers.frame_refinement import has_tail
 from studio.search.trackers.impossible_turns import costs_of_turning
+from studio.search.trackers.limb_resampling import has_tail
 from studio.search.trackers.refinement import RefinementSettings
 
 GRID_S, BODY_GRID_S = 0.1, 0.5

@@ -34,8 +34,8 @@ from studio.foundations.arrays import Array, Indices, consecutive
 from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
-from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame, has_tail, redrawn, turned_pose
 from studio.search.trackers.impossible_turns import TURN, costs_of_turning, turned_too_fast
+from studio.search.trackers.limb_resampling import Hypothesis, SeenFrame, has_tail, redrawn, turned_pose
 from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.side_exchange import (
     MOST_GAIN,

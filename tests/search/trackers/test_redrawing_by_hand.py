@@ -15,10 +15,10 @@ from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.model import BodyModel
 from studio.evidence.volume.alignment import root_parameters
 from studio.search.likelihood.catalogue import LossLimit
-from studio.search.trackers import frame_refinement as frames
+from studio.search.trackers import frame_refinement, limb_resampling
 from studio.search.trackers.agreement import Disagreement
-from studio.search.trackers.frame_refinement import Hypothesis, SeenFrame
 from studio.search.trackers.limb_colours import Gain
+from studio.search.trackers.limb_resampling import Hypothesis, SeenFrame
 from studio.search.trackers.limbs_elsewhere import Elsewhere
 from studio.search.trackers.loss_detection import Onlooker, Sight, WeightWatch, is_blank, shown_by
 from studio.search.trackers.refinement import RefinementSettings, Refiner
@@ -44,7 +44,7 @@ def refiner(body: BodyModel) -> Refiner:
 
 def test_a_limb_is_bent_by_its_angles_with_limits(refiner: Refiner) -> None:
     for limb in ("left arm", "root", "right leg"):
-        own = frames.bent_by(refiner, limb)
+        own = limb_resampling.bent_by(refiner, limb)
         expected = [
             at
             for at, entry in enumerate(refiner.body.parameters)
@@ -55,10 +55,10 @@ def test_a_limb_is_bent_by_its_angles_with_limits(refiner: Refiner) -> None:
 
 def test_half_of_the_draws_lie_about_a_limbs_pose_and_half_anywhere_in_its_range(refiner: Refiner) -> None:
     """Of 100, 25 with a tenth of the range as deviation, 25 with three tenths, 50 evenly."""
-    own = frames.bent_by(refiner, "left arm")
+    own = limb_resampling.bent_by(refiner, "left arm")
     lower, upper = refiner.lower[own], refiner.upper[own]
     poses = np.stack([refiner.neutral, refiner.neutral + 0.1])
-    found = frames._drawn(np.random.default_rng(0), refiner, poses, own, 100).reshape(2, 100, -1)
+    found = limb_resampling._drawn(np.random.default_rng(0), refiner, poses, own, 100).reshape(2, 100, -1)
     others = np.setdiff1d(np.arange(poses.shape[1]), own)
     np.testing.assert_array_equal(found[:, :, others], np.repeat(poses[:, None, others], 100, axis=1))
     rng = np.random.default_rng(0)
@@ -68,7 +68,7 @@ def test_half_of_the_draws_lie_about_a_limbs_pose_and_half_anywhere_in_its_range
     ]
     parts.append(lower + (upper - lower) * rng.random((2, 50, len(own))))
     np.testing.assert_allclose(found[:, :, own], np.clip(np.concatenate(parts, axis=1), lower, upper))
-    assert len(frames._drawn(np.random.default_rng(0), refiner, poses[:1], own)) == 1024
+    assert len(limb_resampling._drawn(np.random.default_rng(0), refiner, poses[:1], own)) == 1024
 
 
 def test_the_best_draws_differ_by_four_tenths_of_a_radian_in_some_angle() -> None:
@@ -76,7 +76,7 @@ def test_the_best_draws_differ_by_four_tenths_of_a_radian_in_some_angle() -> Non
     off = np.array([3.0, 1.0, 2.0, 5.0, 4.0, 3.0])
     # 0.39 first; 0.41 and 0 are too near to it.
     for most, rows in ((1, [1]), (2, [1, 5]), (3, [1, 5, 4]), (9, [1, 5, 4, 3])):
-        found = frames._best_apart(drawn, off, [0, 1] if most == 9 else [0], most)
+        found = limb_resampling._best_apart(drawn, off, [0, 1] if most == 9 else [0], most)
         expected = rows if most < 9 else [1, 2, 5, 4, 3]
         assert [one.tolist() for one in found] == [drawn[row].tolist() for row in expected]
 
@@ -86,7 +86,7 @@ def test_angles_are_drawn_joint_by_joint_from_the_root_on() -> None:
     tail = [
         at for at, entry in enumerate(mouse.parameters) if entry.limb == "tail" and mouse.bounded_angles[at]
     ]
-    found = frames._joints_of(mouse, tail)
+    found = limb_resampling._joints_of(mouse, tail)
     assert [angle for angles in found for angle in angles] == sorted(tail)
     for angles in found:
         assert [set(angles) <= set(joint.parameters) for joint in mouse.joints].count(True) == 1
@@ -103,13 +103,13 @@ def test_a_chain_of_eight_is_a_tail_where_limits_keep_a_body_off_its_back() -> N
             entries[at] = dataclasses.replace(entries[at], lower=-limit, upper=limit)
         return dataclasses.replace(mouse, parameters=tuple(entries))
 
-    assert not frames.has_tail(mouse)
+    assert not limb_resampling.has_tail(mouse)
     upright = limited(root[0], limit=1.0)
-    assert frames.has_tail(upright)
+    assert limb_resampling.has_tail(upright)
     mouse = upright
     # Of seven angles with limits it is drawn at once.
-    assert not frames.has_tail(limited(tail, limit=math.inf))
-    assert not frames.has_tail(load_body("planar_arm4"))
+    assert not limb_resampling.has_tail(limited(tail, limit=math.inf))
+    assert not limb_resampling.has_tail(load_body("planar_arm4"))
 
 
 def test_a_body_is_turned_by_half_a_turn_about_the_middle_of_its_trunk() -> None:
@@ -117,7 +117,7 @@ def test_a_body_is_turned_by_half_a_turn_about_the_middle_of_its_trunk() -> None
     pose = mouse.neutral.copy()
     root = root_parameters(mouse)
     pose[root] += np.where(mouse.angles[root], 0.1, 20.0)
-    turned = frames.turned_pose(mouse, pose)
+    turned = limb_resampling.turned_pose(mouse, pose)
     trunk = [number for number, limb in enumerate(mouse.drawn) if limb.part == "trunk"]
     middle = [limb_ends(mouse, one[None])[0, trunk].mean(axis=(0, 1)) for one in (pose, turned)]
     np.testing.assert_allclose(middle[1], middle[0], atol=1e-6)
@@ -125,7 +125,7 @@ def test_a_body_is_turned_by_half_a_turn_about_the_middle_of_its_trunk() -> None
     np.testing.assert_allclose(after, np.diag([-1.0, -1.0, 1.0]) @ before, atol=1e-9)
     rest = np.setdiff1d(np.arange(len(pose)), root)
     np.testing.assert_array_equal(turned[rest], pose[rest])
-    assert frames.turned_pose(load_body("planar_arm4"), np.zeros(4)) is None
+    assert limb_resampling.turned_pose(load_body("planar_arm4"), np.zeros(4)) is None
 
 
 def hypothesis(loss: float, **shares: float) -> Hypothesis:
@@ -184,7 +184,7 @@ def test_doubtful_limbs_are_drawn_once_each_the_worst_first_then_a_lost_one_with
 
     start = of(9.0, 0.031, 0.05, 0.2, 0.029)
     frame = Told(body, refiner, {"left leg": of(8.0, 0.031, 0.02, 0.061, 0.029)})
-    found, evaluated = frames.redrawn(np.random.default_rng(0), start, frame)
+    found, evaluated = limb_resampling.redrawn(np.random.default_rng(0), start, frame)
     # The leg is drawn and is still lost, the right arm has become sound; so both legs are drawn together.
     assert [one for one in frame.asked if one[0] == "best of"] == [
         ("best of", ("left leg",), 1024, 0.85),
@@ -202,15 +202,15 @@ def test_sound_limbs_are_not_drawn_and_the_last_pose_is_tried_first(
 ) -> None:
     sound = with_pose(hypothesis(9.0, **{"left arm": 0.0299, "left leg": 0.0}), posed)
     frame = Told(body, refiner)
-    assert frames.redrawn(np.random.default_rng(0), sound, frame) == (sound, 0)
+    assert limb_resampling.redrawn(np.random.default_rng(0), sound, frame) == (sound, 0)
     assert frame.asked == []
     other = dataclasses.replace(sound, loss=3.0)
     frame = Told(body, refiner, {"last": other})
-    assert frames.redrawn(np.random.default_rng(0), sound, frame, np.array([5.0])) == (other, 0)
+    assert limb_resampling.redrawn(np.random.default_rng(0), sound, frame, np.array([5.0])) == (other, 0)
     assert frame.asked == [("better", 5.0, 0.85), ("refined", 3.0)]
     doubtful = with_pose(hypothesis(9.0, **{"left arm": 0.03, "left leg": 0.06}), posed)
     frame = Told(body, refiner)
-    assert frames.redrawn(np.random.default_rng(0), doubtful, frame) == (doubtful, 2048)
+    assert limb_resampling.redrawn(np.random.default_rng(0), doubtful, frame) == (doubtful, 2048)
     assert len(frame.asked) == 2
 
 
@@ -243,7 +243,7 @@ def recoloured_with(
         hypothesis=lambda one: Hypothesis(one, 10.0 * loss, None),
     )  # fmt: skip
     arms, began_with = {"left arm": Elsewhere(0.0, explained, shown)}, Hypothesis(pose, 10.0, None)
-    found, drawn = frames.recoloured(np.random.default_rng(0), began_with, frame, arms, gains_of)
+    found, drawn = limb_resampling.recoloured(np.random.default_rng(0), began_with, frame, arms, gains_of)
     return found is not began_with, drawn
 
 
@@ -280,9 +280,9 @@ def tailed() -> Refiner:
 
 def test_a_chain_is_drawn_joint_by_joint_from_a_straight_one(tailed: Refiner) -> None:
     """One pose and 160 draws of it for the first joint; of six that are kept 160 each for every other."""
-    own, asked = frames.bent_by(tailed, "tail"), []
+    own, asked = limb_resampling.bent_by(tailed, "tail"), []
     pose = tailed.neutral + 0.05
-    joints = frames._joints_of(tailed.body, own)
+    joints = limb_resampling._joints_of(tailed.body, own)
     frame = Told(tailed.body, tailed)
 
     def places(poses: Array, silhouettes: object) -> Array:
@@ -291,7 +291,7 @@ def test_a_chain_is_drawn_joint_by_joint_from_a_straight_one(tailed: Refiner) ->
         return -np.arange(len(poses), dtype=float)
 
     frame.agreement = SimpleNamespace(of_places=places)
-    kept, weighed = frames.drawn_along(np.random.default_rng(0), frame, pose, own)
+    kept, weighed = limb_resampling.drawn_along(np.random.default_rng(0), frame, pose, own)
     assert [len(poses) for poses in asked] == [161] + [6 + 6 * 160] * (len(joints) - 1)
     assert weighed == sum(len(poses) for poses in asked)
     assert kept.shape == (6, len(pose))
@@ -309,7 +309,7 @@ def test_a_chain_is_drawn_joint_by_joint_from_a_straight_one(tailed: Refiner) ->
 def test_a_body_is_turned_round_where_its_loss_is_clearly_lower(
     tailed: Refiner, loss: float, turned: bool
 ) -> None:
-    own = frames.bent_by(tailed, "tail")
+    own = limb_resampling.bent_by(tailed, "tail")
     found, other = (with_pose(hypothesis(value, tail=0.5), tailed.neutral) for value in (10.0, loss))
     frame = Told(tailed.body, tailed, {"tail": other})
     frame.hypothesis = lambda pose: with_pose(found, pose)
@@ -317,7 +317,7 @@ def test_a_body_is_turned_round_where_its_loss_is_clearly_lower(
         refine=lambda pose, views: SimpleNamespace(pose=pose), body=tailed.body, neutral=tailed.neutral,
         lower=tailed.lower, upper=tailed.upper, bounded=tailed.bounded,
     )  # fmt: skip
-    one, weighed = frames._turned_round(np.random.default_rng(0), found, frame, own)
+    one, weighed = limb_resampling._turned_round(np.random.default_rng(0), found, frame, own)
     assert one is (other if turned else found)
     assert weighed > 1000
     # What is drawn of the tail is taken wherever it is better at all.
@@ -327,12 +327,12 @@ def test_a_body_is_turned_round_where_its_loss_is_clearly_lower(
 def test_a_lost_tail_is_drawn_along_and_then_with_the_body_turned_round(
     tailed: Refiner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(frames, "_turned_round", lambda rng, found, frame, own: (found, 7))
-    monkeypatch.setattr(frames, "drawn_along", lambda rng, frame, pose, own: (pose[None], 100))
+    monkeypatch.setattr(limb_resampling, "_turned_round", lambda rng, found, frame, own: (found, 7))
+    monkeypatch.setattr(limb_resampling, "drawn_along", lambda rng, frame, pose, own: (pose[None], 100))
     for share, weighed in ((0.061, 107), (0.06, 100)):
         lost = with_pose(hypothesis(9.0, tail=share, trunk=0.0), tailed.neutral)
         frame = Told(tailed.body, tailed)
-        assert frames.redrawn(np.random.default_rng(0), lost, frame) == (lost, weighed)
+        assert limb_resampling.redrawn(np.random.default_rng(0), lost, frame) == (lost, weighed)
         assert frame.asked == [("best of", ("tail",), 1, 0.97)]
 
 
@@ -341,12 +341,14 @@ def test_a_tail_that_disagrees_with_nothing_is_drawn_where_others_leave_somethin
 ) -> None:
     """It lies before the body; where it should be, the rump is the nearest limb."""
     turns: list[float] = []
-    monkeypatch.setattr(frames, "_turned_round", lambda rng, found, frame, own: turns.append(found.loss))
-    monkeypatch.setattr(frames, "drawn_along", lambda rng, frame, pose, own: (pose[None], 100))
+    monkeypatch.setattr(
+        limb_resampling, "_turned_round", lambda rng, found, frame, own: turns.append(found.loss)
+    )
+    monkeypatch.setattr(limb_resampling, "drawn_along", lambda rng, frame, pose, own: (pose[None], 100))
     neutral = tailed.body.neutral
     hidden = with_pose(hypothesis(9.0, tail=0.0, root=0.029, head=0.002), neutral)
     frame = Told(tailed.body, tailed, {"tail": with_pose(hypothesis(4.0, tail=0.0, root=0.0), neutral)})
-    found, weighed = frames.redrawn(np.random.default_rng(0), hidden, frame)
+    found, weighed = limb_resampling.redrawn(np.random.default_rng(0), hidden, frame)
     assert (found.loss, weighed) == (4.0, 100)
     assert frame.asked[0] == ("best of", ("tail",), 1, 0.97)
     # A tail that itself agrees is no reason to turn the body round.
@@ -354,10 +356,10 @@ def test_a_tail_that_disagrees_with_nothing_is_drawn_where_others_leave_somethin
     # What others cover outside is not the tail's, nor does a body without one look for it.
     off = hypothesis(9.0, tail=0.0, root=0.5).off
     outside = dataclasses.replace(off, outside=off.bare, bare=off.outside)
-    assert frames._doubts(outside, ["tail"]) == {"tail": 0.0, "root": 0.5}
-    assert frames._doubts(off, []) == {"tail": 0.0, "root": 0.5}
+    assert limb_resampling._doubts(outside, ["tail"]) == {"tail": 0.0, "root": 0.5}
+    assert limb_resampling._doubts(off, []) == {"tail": 0.0, "root": 0.5}
     # 5000 mm² are bare, and the tail has 10 000.
-    assert frames._doubts(off, ["tail"]) == {"tail": 0.5, "root": 0.5}
+    assert limb_resampling._doubts(off, ["tail"]) == {"tail": 0.5, "root": 0.5}
 
 
 def test_another_pose_is_taken_below_its_share_of_the_loss() -> None:
@@ -393,7 +395,7 @@ def test_the_next_frame_starts_at_the_refined_pose_or_in_the_cloud_moved_with_it
         0, Estimate(found, found, found, 0.0), 1, 3, 1, 1.0,
         FilterState(ParticleSet(cloud, np.zeros(3)), found, found - 1.0, {"kept": np.ones(1)}),
     )  # fmt: skip
-    at, moved = (frames._carried(result, pose, start, refiner) for start in ("pose", "cloud"))
+    at, moved = (frame_refinement._carried(result, pose, start, refiner) for start in ("pose", "cloud"))
     np.testing.assert_array_equal(at.particles.poses, np.tile(pose, (3, 1)))
     np.testing.assert_allclose(
         moved.particles.poses, np.clip(cloud + (pose - found), refiner.lower, refiner.upper)
@@ -521,7 +523,7 @@ def stretches(
 
 
 def test_a_track_breaks_where_more_is_missing_than_may_be_filled_and_where_an_angle_jumps() -> None:
-    """A tenth of a second at 30 a second is three frames."""
+    """A tenth of a second at 30 a second is three limbs."""
     assert stretches([0, 1, 5, 6], [0.0] * 4) == [(0, 4)]
     assert stretches([0, 1, 6, 7], [0.0] * 4) == [(0, 2), (2, 4)]
     for by, parts in ((1.49, [(0, 3)]), (1.51, [(0, 1), (1, 3)]), (-1.51, [(0, 1), (1, 3)])):

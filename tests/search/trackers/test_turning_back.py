@@ -11,7 +11,7 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.evidence.distance_maps import SilhouetteDistances, silhouettes_by_camera
 from studio.foundations.arrays import Array, Indices
-from studio.search.trackers.frame_refinement import turned_pose
+from studio.search.trackers.limb_resampling import turned_pose
 from studio.search.trackers.turning_back import Turn, stretches, with_facing_right
 
 CAMERAS = tuple(

@@ -52,7 +52,7 @@ from studio.search.trackers.limbs_elsewhere import (
 )
 from studio.search.trackers.random_numbers import keyed_generator
 from studio.search.trackers.refinement import RefinementSettings, Refiner
-from studio.search.trackers.told_limbs import limbs_told
+from studio.search.trackers.reported_limbs import reported_limbs, reported_lost
 from studio.search.trackers.tracker import LIMB_LOST_PROBABILITY
 
 BODY = "human35"
@@ -229,10 +229,10 @@ class Looking:
             certainty = self._certainty.of(pose, matrix, certainty.moved)
         off = self._agreement.of(pose, seen)
         elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
-        told = limbs_told(self._network, pose, pictures, elsewhere)
-        lost = certainty.lost(off, elsewhere, [limb for limb, one in told.items() if one.is_lost])
+        reported = reported_lost(self.body, pose, reported_limbs(self._network, pose, pictures, elsewhere))
+        lost = certainty.lost(off, elsewhere, reported)
         by_run = [limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY]
-        return tuple(by_run), tuple(contradicted_limbs(off, elsewhere, told))
+        return tuple(by_run), tuple(contradicted_limbs(off, elsewhere, reported))
 
     def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[Bytes]:
         """Each view's mask (H, W) without a limb of a pose, where no other limb of it lies."""
