@@ -81,6 +81,11 @@ class GaussianBackground:
         self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
         self.is_grey = float(np.ptp(self._samples, axis=2).mean()) < GREY_SPREAD
 
+    @property
+    def picture(self) -> Bytes:
+        """(H, W, 3) BGR: the mean, in whole grey levels."""
+        return self._rough
+
     def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Foreground:
         """What of a picture (H, W, 3) differs from the background."""
         gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)

@@ -59,6 +59,14 @@ class Backgrounds:
                 self._fitted[camera, kind] = model
             return model
 
+    def empty(self, camera: str) -> Bytes | None:
+        """(H, W, 3) BGR: what the camera sees without the subject; None if there is too little to know it by."""
+        try:
+            model = self.model(camera, "gaussian")
+        except FootageError:
+            return None
+        return model.picture if isinstance(model, GaussianBackground) else None
+
     def release(self, camera: str) -> None:
         """Drop the models of one camera; they are fitted again when needed."""
         with self._locks[camera]:

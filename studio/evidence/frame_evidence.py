@@ -26,6 +26,7 @@ class ViewEvidence:
         (`distance_maps`) leave the first out and count the second half, a hull is not carved by it (`open_mask`),
         likelihoods count it by `half_mask`.
     shadow : (H, W) uint8, 255 where a pixel changed but passed for a shadow, whatever became of it. None: nowhere.
+    empty : (H, W, 3) uint8 BGR: the picture without the subject. None: not asked for, or not known.
     """
 
     camera: str
@@ -35,6 +36,7 @@ class ViewEvidence:
     background: YuvBackground | None = None
     unknown: Bytes | None = None
     shadow: Bytes | None = None
+    empty: Bytes | None = None
 
 
 def half_mask(view: ViewEvidence) -> Bytes:

@@ -84,8 +84,12 @@ class EvidenceMaker:
         settings: EvidenceSettings,
         edge_kind: str = "proximity",
         executor: Executor | None = None,
+        *,
+        with_empty: bool = False,
     ) -> None:
-        """cameras : in the order of the views. edge_kind : one of EDGE_KINDS. executor : threads to use."""
+        """cameras : in the order of the views. edge_kind : one of EDGE_KINDS. executor : threads to use. with_empty :
+        whether views have what the camera sees without the subject.
+        """
         if edge_kind not in EDGE_KINDS:
             raise ValueError(edge_kind)
         cv2.setNumThreads(1)
@@ -93,7 +97,7 @@ class EvidenceMaker:
         self.settings, self.edge_kind = settings, edge_kind
         self.footage, self._backgrounds, self._executor = footage, backgrounds, executor
         self.hull_of_pixels = edge_kind == "hull" and self._from_pixels()
-        self._filmed_by = {camera.name: camera for camera in cameras}
+        self._filmed_by, self._with_empty = {camera.name: camera for camera in cameras}, with_empty
         self._cells = LRUCache[tuple[str, int], Cells](KEPT_CELLS)
 
     def release(self, camera: str) -> None:
@@ -154,6 +158,8 @@ class EvidenceMaker:
             mask, unknown = self.finished(camera, raw)
         given = self._hidden(camera, frame)
         view = self.of_mask(camera, frame, mask, unknown if given is None else given)
+        if self._with_empty:
+            view = replace(view, empty=self._backgrounds.empty(camera))
         if raw.shadow is None:
             return view
         return replace(view, shadow=_not_excluded(raw.shadow, self._backgrounds.exclusion(camera)))

@@ -33,6 +33,7 @@ from studio.search.likelihood.overlay import limb_contours
 from studio.search.settings import RunSettings, settings_from_values
 from studio.search.trackers.agreement import Agreement, Disagreement
 from studio.search.trackers.hidden_areas import without_hidden
+from studio.search.trackers.limb_resampling import thin_limbs_of
 from studio.search.trackers.limbs_elsewhere import (
     Elsewhere,
     LimbsElsewhere,
@@ -43,6 +44,7 @@ from studio.search.trackers.limbs_elsewhere import (
 from studio.search.trackers.loss_detection import anything_seen
 from studio.search.trackers.reported_limbs import reported_limbs, reported_lost
 from studio.search.trackers.start_candidates import facing
+from studio.search.trackers.thin_limbs import HALF_PLAIN, strengths_along
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
@@ -199,7 +201,8 @@ def check_run(
     with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
         known = set(results.frames())
         backgrounds, knobs = Backgrounds(footage), settings.evidence
-        maker = EvidenceMaker(cameras, footage, backgrounds, knobs, "none")
+        thin = thin_limbs_of(body, cameras, settings.refinement.above_floor)
+        maker = EvidenceMaker(cameras, footage, backgrounds, knobs, "none", with_empty=bool(thin))
         witness, network = LimbsElsewhere(body, cameras), LimbsByNetwork(body, cameras)
         for done, row in enumerate(rows):
             progress("comparing with the masks", done, len(rows))
@@ -214,9 +217,10 @@ def check_run(
                     elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
                 pictures = {view.camera: view.picture for view in evidence.views}
                 reported = reported_lost(body, pose, reported_limbs(network, pose, pictures, elsewhere))
+                strengths = strengths_along(thin, pose, changes_by_camera(evidence), off.corners)
                 contradicted += [
                     ContradictedLimb(frame, limb, *found)
-                    for limb, found in contradicted_limbs(off, elsewhere, reported).items()
+                    for limb, found in contradicted_limbs(off, elsewhere, reported, strengths).items()
                 ]
     check = RunCheck(
         track=chosen.name,
@@ -286,16 +290,22 @@ def _contradicted(
 
 
 def contradicted_limbs(
-    off: Disagreement, elsewhere: Mapping[str, Elsewhere], reported: Collection[str]
+    off: Disagreement,
+    elsewhere: Mapping[str, Elsewhere],
+    reported: Collection[str],
+    lines: Mapping[str, float] | None = None,
 ) -> dict[str, tuple[float, bool]]:
     """By limb that masks or pictures contradict the share of its area that disagrees with the masks, and whether the
     pictures do. off : of a pose. elsewhere : of `LimbsElsewhere`. reported : of `reported_lost`.
+    lines : by thin limb how plainly lines run along it (`thin_limbs`), which alone says whether it is contradicted.
     """
-    lost = {*lost_of(elsewhere), *reported}
+    plain = lines or {}
+    lost = {*lost_of(elsewhere), *reported} - plain.keys()
+    lost |= {limb for limb, strength in plain.items() if strength < HALF_PLAIN}
     return {
         limb: (round(share, 3), limb in lost)
         for limb, share in without_sure(off, elsewhere).shares().items()
-        if share > LIMB_LOST_SHARE or limb in lost
+        if (share > LIMB_LOST_SHARE and limb not in plain) or limb in lost
     }
 
 

@@ -26,6 +26,7 @@ from studio.runs.run_footage import filmed_cameras
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.silhouette_areas import HALF, silhouettes_of
 from studio.search.settings import RunSettings
+from studio.search.trackers.limb_resampling import chains_of
 from studio.search.trackers.loss_detection import anything_seen, shown_by
 from studio.search.trackers.recovery_settings import OFF
 from studio.search.trackers.tracker import FrameLikelihood
@@ -66,6 +67,7 @@ class ProblemSource:
         self._backgrounds = Backgrounds(self.footage)
         self._executor = executor
         self._views = views
+        self._has_thin_limbs = bool(chains_of(body))
         self._keeping, self._making = threading.Lock(), threading.Lock()
         self._coming: tuple[Hashable, Future[FrameLikelihood]] | None = None
         self._latest: tuple[int, RunSettings, FrameLikelihood] | None = None
@@ -103,6 +105,7 @@ class ProblemSource:
                     settings.evidence,
                     WEIGHTINGS[settings.weighting_name].edge_kind,
                     self._views,
+                    with_empty=self._has_thin_limbs and settings.refinement.thin_limbs,
                 )
                 evidence = self._keep(self._evidence, key, maker.evidence(frame))
             return evidence
@@ -195,7 +198,8 @@ def check_seen(session: Session, evidence: FrameEvidence) -> None:
 
 def evidence_key(frame: int, settings: RunSettings) -> Hashable:
     """What a frame's evidence depends on."""
-    return (frame, settings.evidence, WEIGHTINGS[settings.weighting_name].edge_kind)
+    kind = WEIGHTINGS[settings.weighting_name].edge_kind
+    return (frame, settings.evidence, kind, settings.refinement.thin_limbs)
 
 
 def problem_key(frame: int, settings: RunSettings) -> Hashable:

@@ -29,6 +29,7 @@ BEFORE: dict[str, Value] = {
     "above_floor": False,
     "limb_colours": False,
     "ask_network_every": 0,
+    "thin_limbs": False,
     "mask_shadow_window": 1,
     "mask_shadow_floor": False,
     "mask_shadow_alike": 0.0,

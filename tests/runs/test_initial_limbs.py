@@ -1,9 +1,8 @@
 """Limbs that a start pose has in a wrong place are found on the silhouettes."""
 
-import dataclasses
-
 import numpy as np
 import pytest
+from drawn_mice import SMALL, rearing_mouse
 from drawn_people import drawn_evidence, ring_of_cameras
 from moving_bodies import standing
 
@@ -75,23 +74,6 @@ def test_a_pose_that_fits_is_not_lost(body: BodyModel, stretched: np.ndarray) ->
     assert onlooker.sight(evidence, found).overlap >= onlooker.sight(evidence, stretched).overlap
     for marker in ("RWrist", "LWrist", "LAnkle", "Head"):
         assert off(body, found, stretched, marker) < 40.0
-
-
-SMALL = tuple(
-    dataclasses.replace(camera, translation=camera.translation / 10.0)
-    for camera in ring_of_cameras(3, 640, 480)
-)
-"""Around an animal of a hand's length."""
-
-
-def rearing_mouse(**changed: float) -> np.ndarray:
-    """Reared up, the tail on the floor behind it."""
-    mouse = load_body("mouse31")
-    names = [entry.name for entry in mouse.parameters]
-    pose, values = mouse.neutral, {"pitch": -1.2, "pelvis_z": 40.0, "left_haunch_swing": -1.2, **changed}
-    for name, value in {"right_haunch_swing": -1.2, "tail_lift": 1.2, "tail_2_wag": 0.6, **values}.items():
-        pose[names.index(name)] = value
-    return pose
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

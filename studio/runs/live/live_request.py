@@ -15,8 +15,10 @@ from studio.sessions.session import Session
 
 
 def live_changes(changes: Mapping[str, object]) -> dict[str, object]:
-    """The knobs of a live run that differ from the defaults: the requested ones, and a quick recovery."""
-    return {"recovery": SPREAD, **changes}
+    """The knobs of a live run that differ from the defaults: the requested ones, a quick recovery, and no looking for
+    thin limbs, which takes long and a background of frames that are still to come.
+    """
+    return {"recovery": SPREAD, "thin_limbs": False, **changes}
 
 
 def check_live(settings: RunSettings, *, live: bool, ping_pong: bool) -> None:

@@ -29,9 +29,11 @@ from studio.search.trackers.limb_resampling import (
     DOUBTFUL_SHARE,
     Hypothesis,
     SeenFrame,
+    drawn_along_lines,
     drawn_where_reported,
     recoloured,
     redrawn,
+    thin_limbs_of,
 )
 from studio.search.trackers.limbs_elsewhere import Change, Elsewhere, LimbsElsewhere, lost_of
 from studio.search.trackers.random_numbers import keyed_generator
@@ -48,6 +50,7 @@ from studio.search.trackers.reported_limbs import (
     reported_limbs,
     reported_lost,
 )
+from studio.search.trackers.thin_limbs import Lines, ThinLimb
 from studio.search.trackers.tracker import FilterState, FrameLikelihood, FrameResult, SearchSpace
 
 POSE, CLOUD = "pose", "cloud"
@@ -82,6 +85,10 @@ class FrameRefinementSettings:
     limb_colours: bool = next_frame_knob(
         True, label="colours of limbs",
         help="Learn the colours of limbs, and resample one before the body where they say that it is not there.",
+    )  # fmt: skip
+    thin_limbs: bool = next_frame_knob(
+        True, label="thin limbs along lines",
+        help="Find a tail by the lines in the pictures, too: of what is a few pixels wide masks hold only pieces.",
     )  # fmt: skip
     ask_network_every: int = next_frame_knob(
         5, 0, 1000, 1, label="ask the network every", unit="frames",
@@ -165,7 +172,8 @@ class FrameRefiner:
         frame = _FrameInWork(tools, result, silhouettes_of, settings, self._seed, tuple(seen.values()))
         if settings.redraw_limbs:
             frame.redraw_where_silhouettes_deny()
-        if changes_of is not None and (tools.witness.usable or is_due):
+        follows_lines = settings.thin_limbs and bool(tools.thin)
+        if changes_of is not None and (tools.witness.usable or is_due or follows_lines):
             frame.look_at(changes_of())
         if settings.redraw_limbs:
             frame.redraw_where_changes_show()
@@ -175,6 +183,9 @@ class FrameRefiner:
         reported = frame.reported_by(source) if source is not None and is_due else {}
         if reported and settings.redraw_limbs:
             frame.redraw_where_reported(reported)
+
+        if follows_lines:
+            frame.redraw_along_lines(settings.redraw_limbs)
 
         pose = frame.pose
         certainty = tools.certainty_of.of(pose, frame.normal_matrix(), memory)
@@ -201,7 +212,7 @@ class FrameRefiner:
             carried=dataclasses.replace(carried, memory=memory),
             evaluations=result.evaluations + frame.evaluations,
             disagreement=frame.off.shares(),
-            limb_loss=certainty.lost(frame.off, frame.elsewhere, lost),
+            limb_loss=certainty.lost(frame.off, frame.elsewhere, lost, frame.along_lines()),
         )
 
     def _made_for(
@@ -216,6 +227,7 @@ class FrameRefiner:
             CertaintyOfLimbs(ending),
             LimbsElsewhere(self._body, cameras),
             LimbColours(self._body, cameras),
+            thin_limbs_of(self._body, cameras, settings.refinement_floor),
         )
 
 
@@ -228,6 +240,7 @@ class _Tools(NamedTuple):
     certainty_of: CertaintyOfLimbs
     witness: LimbsElsewhere
     colours: LimbColours
+    thin: Mapping[str, ThinLimb]
 
 
 class _FrameInWork:
@@ -250,6 +263,7 @@ class _FrameInWork:
         self._silhouettes_of, self._points = silhouettes_of, settings.refine_frame_points
         self._memory, self.masks = result.carried.memory, masks
         self._changes, self.elsewhere, self.evaluations = dict[str, Change](), dict[str, Elsewhere](), 0
+        self._lines = dict[str, list[Lines | None]]()
         self.pose = result.estimate.pose
         self.silhouettes = self._without_hidden(masks)
         self._ended = tools.refiner.refine(self.pose, self.silhouettes)
@@ -311,6 +325,27 @@ class _FrameInWork:
         began = frame.hypothesis(self.pose)
         if self._take(began, *drawn_where_reported(self._rng(3), began, frame, reported)):
             self.masks, self.silhouettes = masks, silhouettes
+
+    def redraw_along_lines(self, redraw: bool) -> None:
+        """See where lines in the pictures run, and resample thin limbs along them. redraw : whether they are."""
+        for number, (limb, thin) in enumerate(self._tools.thin.items()):
+            lines = thin.lines(self.pose, self._changes, self._tools.agreement.corners(self.pose))
+            if not any(one is not None for one in lines):
+                continue
+            self._lines[limb] = lines
+            if not redraw:
+                continue
+            frame = self._seen(self.silhouettes)
+            loss = frame.refiner.loss_with_pull(self.pose, self.silhouettes)
+            began, last = Hypothesis(self.pose, loss, self.off), self._result.carried.previous_estimate
+            self._take(began, *drawn_along_lines(self._rng(4 + number), began, frame, thin, lines, last))
+
+    def along_lines(self) -> dict[str, float]:
+        """By thin limb how plainly lines run along it, where they are seen."""
+        found = {
+            limb: self._tools.thin[limb].support(self.pose, lines) for limb, lines in self._lines.items()
+        }
+        return {limb: one for limb, one in found.items() if one is not None}
 
     def normal_matrix(self) -> Array:
         """(D, D) of the least squares at the pose."""

@@ -47,6 +47,7 @@ from studio.foundations.arrays import Array
 from studio.search.trackers.agreement import LEAST_AREA, Disagreement, limb_names
 from studio.search.trackers.limbs_elsewhere import Elsewhere, is_shown, lost_of, without_sure
 from studio.search.trackers.refinement import Refiner, rigid_limbs
+from studio.search.trackers.thin_limbs import HALF_PLAIN
 from studio.search.trackers.tracker import LIMB_LOST_SHARE, MOVED
 
 RESIDUAL_MM = 40.0
@@ -64,6 +65,8 @@ CONSTANT, WEIGHTS = 3.90, np.array([1.37, 0.44, 1.81])
 """Log-odds of a lost limb: of no sign, and per logarithm of outside, of bare, and of jump times that of deviation."""
 WITNESSED = 3.0
 """Least log-odds of a limb that the pictures show in another place."""
+LINE_ODDS = 20.0
+"""Log-odds of a lost thin limb, per strength of the lines along it below HALF_PLAIN."""
 ENDS, JUMPS = f"{MOVED}ends", f"{MOVED}jumps"
 
 
@@ -84,15 +87,20 @@ class Certainty:
         off: Disagreement,
         pictures: Mapping[str, Elsewhere] | None = None,
         reported: Collection[str] = (),
+        lines: Mapping[str, float] | None = None,
     ) -> dict[str, float]:
         """By limb the probability that it is lost. off : the pose's disagreement with the silhouettes. pictures : by
         limb what changed in them, if that is known. reported : limbs that are reported lost (`reported_limbs`).
+        lines : by thin limb how plainly lines in the pictures run along it (`thin_limbs`), which alone says whether it
+        is lost.
         """
         known = pictures or {}
         signs, bare = self.signs(without_sure(off, known), known)
         odds = np.where(bare > LIMB_LOST_SHARE, np.inf, CONSTANT + signs @ WEIGHTS)
         elsewhere = {*lost_of(known), *reported}
         odds = np.where([limb in elsewhere for limb in self.limbs], np.maximum(odds, WITNESSED), odds)
+        for limb, strength in (lines or {}).items():
+            odds[self.limbs.index(limb)] = LINE_ODDS * (HALF_PLAIN - strength)
         return dict(zip(self.limbs, (1.0 / (1.0 + np.exp(-odds))).tolist(), strict=True))
 
     def signs(self, off: Disagreement, pictures: Mapping[str, Elsewhere]) -> tuple[Array, Array]:

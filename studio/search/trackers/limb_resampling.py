@@ -19,11 +19,13 @@ from studio.body.mirroring import name_twins
 from studio.body.model import BodyModel
 from studio.evidence.volume.alignment import root_parameters, with_root_at
 from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
 from studio.search.trackers.agreement import GRID_MM, LEAST_AREA, Agreement, Disagreement
 from studio.search.trackers.limb_colours import Gain
 from studio.search.trackers.limbs_elsewhere import SURELY_SHOWN, Elsewhere, is_sure
 from studio.search.trackers.refinement import Distances, Refiner
 from studio.search.trackers.reported_limbs import THERE_MM, ReportedLimb, off_from
+from studio.search.trackers.thin_limbs import Lines, ThinLimb
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 
 DOUBTFUL_SHARE = 0.03
@@ -61,6 +63,13 @@ BELIEF, NEARER = 0.1, 0.6
 reported, if they sum to 1 + BELIEF · NEARER at most: without a higher loss it must have the limb at NEARER of the
 distance. One that has not come to where it is reported must have BETTER_CHAIN of the loss, too: before the body a
 limb is as well everywhere."""
+KEPT_ALONG_LINES, DRAWS_ALONG_LINES, CLIMBING_DRAWS = 12, 300, 40
+NARROWER = (0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.03, 0.03, 0.02, 0.02)
+"""Of a thin limb: how many poses are kept from joint to joint, how many are drawn from each, and how many from each of
+the best of all joints, with these standard deviations, radians."""
+LEAST_LINES, DENIED_LINES = 0.05, 0.5
+"""What lines must say more (`thin_limbs`) for another pose than for the one found, and by how much they must say more
+where its loss is twice as high."""
 DENIED_DRAWS, DENIED_REFINED = 4096, 16
 """Poses drawn of such a limb, which is far from where it belongs, and how many are refined."""
 
@@ -131,7 +140,7 @@ def redrawn(
     are resampled first, however little they disagree: what a lost limb leaves bare may be nearer to another one.
     """
     evaluations, tried, began_with = 0, set[str](), found
-    chains = _chains(frame.refiner)
+    chains = chains_of(frame.refiner.body)
     if last is not None:
         found = frame.better(found, last)
     while True:
@@ -177,7 +186,7 @@ def recoloured(
     are right, and an arm beside the head never gains what is expected. One that shows where little changed is left to
     the silhouettes: drawn by colours *hard* is at 52 mm instead of 33. gains_of : of poses (N, D) and a limb.
     """
-    evaluations, chains = 0, _chains(frame.refiner)
+    evaluations, chains = 0, chains_of(frame.refiner.body)
     for limb, one in elsewhere.items():
         own, shows = bent_by(frame.refiner, limb), one.shown >= SURELY_SHOWN
         if limb in chains or len(own) < FEWEST_ANGLES or (shows and not is_sure(one)):
@@ -229,6 +238,58 @@ def drawn_where_reported(
     return found, evaluations
 
 
+def drawn_along_lines(
+    rng: np.random.Generator,
+    found: Hypothesis,
+    frame: SeenFrame,
+    thin: ThinLimb,
+    lines: Sequence[Lines | None],
+    last: Array | None = None,
+) -> tuple[Hypothesis, int]:
+    """The hypothesis with a thin limb along the lines in the pictures, if they say clearly more for it than the
+    silhouettes say against it, and the number of poses compared. last : (D,) pose of the last frame, from whose bends
+    it is looked for, too.
+    """
+    refiner, own = frame.refiner, thin.own
+    starts = [found.pose]
+    if last is not None:
+        starts.append(_with(found.pose, own, last))
+    straight = _with(found.pose, own, refiner.neutral)
+    kept, weighed = straight[None], 0
+    joints = _joints_of(refiner.body, own)
+    for number, joint in enumerate(joints):
+        drawn = np.concatenate([kept, _drawn(rng, refiner, kept, joint, DRAWS_ALONG_LINES)])
+        weighed += len(drawn)
+        kept = np.array(_best_apart(drawn, -thin.gains(drawn, lines, number + 1), joint, KEPT_ALONG_LINES))
+    poses = np.concatenate([kept, starts])
+    gains = thin.gains(poses, lines)
+    lower, upper = refiner.lower[own], refiner.upper[own]
+    for spread in NARROWER:
+        drawn = np.repeat(poses[:, None], CLIMBING_DRAWS, axis=1)
+        drawn[:, :, own] += spread * rng.standard_normal((len(poses), CLIMBING_DRAWS, len(own)))
+        drawn[:, :, own] = np.clip(drawn[:, :, own], lower, upper)
+        drawn[:, 0] = poses
+        weighed += drawn.shape[0] * drawn.shape[1]
+        weights = thin.gains(drawn.reshape(-1, drawn.shape[2]), lines).reshape(drawn.shape[:2])
+        rows, best = np.arange(len(poses)), weights.argmax(axis=1)
+        poses, gains = drawn[rows, best], weights[rows, best]
+    most = float(thin.gains(found.pose[None], lines)[0]) + LEAST_LINES
+    began_with = found
+    for row in np.argsort(-gains, kind="stable")[:REFINED_DRAWS]:
+        loss = frame.refiner.loss_with_pull(poses[row], frame.silhouettes)
+        worth = float(gains[row] - DENIED_LINES * max(loss / began_with.loss - 1.0, 0.0))
+        if worth > most:
+            found, most = frame.hypothesis(poses[row]), worth
+    return found, weighed
+
+
+def _with(pose: Array, own: Sequence[int], other: Array) -> Array:
+    """(D,) a pose with some angles of another one."""
+    changed = pose.copy()
+    changed[list(own)] = other[list(own)]
+    return changed
+
+
 def _contradicted(now: Gain, shows: bool) -> bool:
     """Whether a limb's colours say that one pose (N = 1) has it elsewhere. shows : whether it shows there by itself."""
     if shows:
@@ -254,12 +315,28 @@ def redraw_all(rng: np.random.Generator, found: Hypothesis, frame: SeenFrame) ->
     return found
 
 
-def _chains(refiner: Refiner) -> list[str]:
+def chains_of(body: BodyModel) -> list[str]:
     """Limbs that are drawn joint by joint: those of more angles than are drawn at once, of a body with a tail."""
-    if not has_tail(refiner.body):
+    if not has_tail(body):
         return []
-    limbs = dict.fromkeys(entry.limb for entry in refiner.body.parameters)
-    return [limb for limb in limbs if len(bent_by(refiner, limb)) > MOST_TOGETHER]
+    limbs = [
+        entry.limb for entry, limited in zip(body.parameters, body.bounded_angles, strict=True) if limited
+    ]
+    return [limb for limb in dict.fromkeys(limbs) if limbs.count(limb) > MOST_TOGETHER]
+
+
+def thin_limbs_of(body: BodyModel, cameras: Sequence[Camera], on_floor: bool) -> dict[str, ThinLimb]:
+    """By name the limbs that may be found by lines in the pictures. on_floor : whether they stay above z = 0."""
+    return {
+        limb: ThinLimb(
+            body,
+            cameras,
+            limb,
+            [n for n, entry in enumerate(body.parameters) if entry.limb == limb and body.bounded_angles[n]],
+            on_floor,
+        )
+        for limb in chains_of(body)
+    }
 
 
 def _doubts(off: Disagreement, chains: Sequence[str]) -> dict[str, float]:

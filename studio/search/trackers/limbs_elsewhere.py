@@ -97,12 +97,14 @@ class Elsewhere:
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
     """What changed in a view. kinds : (h, w) SAME, CHANGED or OPEN, of cells. size : pixels along a cell's
-    side. picture : (H, W, 3) BGR.
+    side. picture, empty : (H, W, 3) BGR; the latter and mask (H, W) as in `ViewEvidence`.
     """
 
     kinds: Bytes
     size: int
     picture: Bytes
+    empty: Bytes | None = None
+    mask: Bytes | None = None
 
 
 _known: WeakKeyDictionary[FrameEvidence, Mapping[str, Change]] = WeakKeyDictionary()
@@ -124,7 +126,7 @@ def change_of(view: ViewEvidence) -> Change:
     cells_of(
         view.mask, shadow, unknown, size, FILLED, kinds, view.shadow is not None, view.unknown is not None
     )
-    return Change(kinds, size, view.picture)
+    return Change(kinds, size, view.picture, view.empty, view.mask)
 
 
 class LimbsElsewhere:

@@ -95,7 +95,8 @@ UNUSED = {
     },
     "weights as they are": {"survival", "root_spread", "learning_overlap", "learning_interval", "diffusion_scale"},
     "nothing refined": {
-        "refine_frame_steps", "refine_frame_points", "limb_colours", "ask_network_every", "above_floor",
+        "refine_frame_steps", "refine_frame_points", "limb_colours", "thin_limbs", "ask_network_every",
+        "above_floor",
         "refined_spread", "next_frame_from",
     },
     "no recovery": {"lost_after", "recovery_interval"},

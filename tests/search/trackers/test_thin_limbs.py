@@ -1,0 +1,129 @@
+"""A tail that masks lack is found by the lines in the pictures."""
+
+import dataclasses
+from functools import partial
+
+import cv2
+import numpy as np
+import pytest
+from drawn_mice import SMALL, rearing_mouse
+from drawn_people import drawn_evidence, drawn_outlines
+
+from studio.body.catalogue import load_body
+from studio.body.forward_kinematics import marker_points
+from studio.evidence.distance_maps import silhouettes_by_camera
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.foundations.arrays import Array
+from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.trackers.agreement import Agreement
+from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
+from studio.search.trackers.limb_resampling import chains_of, thin_limbs_of
+from studio.search.trackers.limbs_elsewhere import Change, changes_by_camera
+from studio.search.trackers.thin_limbs import HALF_PLAIN, strengths_along
+from studio.search.trackers.tracker import Estimate, FrameResult, start_of
+
+MOUSE = load_body("mouse31")
+TRUTH = rearing_mouse(tail_2_wag=0.3, tail_3_wag=0.3)
+ASTRAY = rearing_mouse(tail_lift=0.4, tail_wag=-0.9, tail_2_wag=-0.6)
+TAIL = [number for number, limb in enumerate(MOUSE.drawn) if limb.name.startswith("tail")]
+TIP = [marker.name for marker in MOUSE.markers].index("TailTip")
+ON_FLOOR = thin_limbs_of(MOUSE, SMALL, on_floor=True)
+
+
+def seen(pose: Array = TRUTH, *, tail: bool = True, empty: bool = True) -> FrameEvidence:
+    """A dark mouse whose masks lack the tail. empty : whether it is known what is seen without it."""
+    rng, views = np.random.default_rng(0), []
+    for camera, view in zip(SMALL, drawn_evidence(MOUSE, pose, SMALL).views, strict=True):
+        room = np.full((camera.height, camera.width, 3), 120, np.uint8)
+        picture, mask = room.copy(), np.zeros_like(view.mask)
+        for number, outline in enumerate(drawn_outlines(MOUSE, pose, camera)):
+            if number not in TAIL:
+                cv2.fillConvexPoly(mask, outline, (255,))
+            if tail or number not in TAIL:
+                cv2.fillConvexPoly(picture, outline, (40, 40, 40) if number not in TAIL else (90, 90, 90))
+        noisy = np.clip(picture + rng.normal(0.0, 2.0, picture.shape), 0, 255).astype(np.uint8)
+        views.append(
+            dataclasses.replace(view, picture=noisy, mask=mask, edges=mask, empty=room if empty else None)
+        )
+    return FrameEvidence(0, tuple(views))
+
+
+def tip_off(pose: Array) -> float:
+    """mm."""
+    return float(np.linalg.norm(np.subtract(*marker_points(MOUSE, np.stack([pose, TRUTH]))[:, TIP])))
+
+
+def refined(evidence: FrameEvidence, **knobs: bool) -> FrameResult:
+    weighting = WEIGHTINGS["edge-region-silhouette"]
+    return FrameRefiner(MOUSE, SMALL, 5).refined(
+        FrameResult(3, Estimate(ASTRAY, ASTRAY, ASTRAY, 0.0), 0, 0, 0, 0.0, start_of(tuple(ASTRAY.tolist()))),
+        partial(silhouettes_by_camera, evidence),
+        weighting.prepare(MOUSE, SMALL, weighting.settings_type()).problem(evidence),
+        dataclasses.replace(FrameRefinementSettings(), **knobs),
+        partial(changes_by_camera, evidence),
+    )
+
+
+def strength_of(pose: Array, evidence: FrameEvidence) -> dict[str, float]:
+    corners = Agreement(MOUSE, SMALL).corners(pose)
+    return strengths_along(ON_FLOOR, pose, changes_by_camera(evidence), corners)
+
+
+def test_a_tail_is_found_that_no_mask_shows() -> None:
+    found, without = refined(seen()), refined(seen(), thin_limbs=False)
+    assert tip_off(without.estimate.pose) > 25.0
+    assert tip_off(found.estimate.pose) < 5.0
+    assert "tail" not in found.limbs_lost
+    assert np.array_equal(refined(seen()).estimate.pose, found.estimate.pose)
+
+
+def test_a_tail_along_no_line_is_lost() -> None:
+    found = refined(seen(tail=False))
+    assert "tail" in found.limbs_lost
+    named = refined(seen(), redraw_limbs=False)
+    assert "tail" in named.limbs_lost
+    assert tip_off(named.estimate.pose) > 25.0
+
+
+def test_lines_are_plain_along_a_tail_that_is_right() -> None:
+    assert strength_of(TRUTH, seen())["tail"] > 0.8
+    assert strength_of(ASTRAY, seen())["tail"] < HALF_PLAIN
+
+
+def test_nothing_is_said_without_an_empty_view_and_a_tail_hidden_from_all_is_lost() -> None:
+    assert strength_of(TRUTH, seen(empty=False)) == {}
+    everywhere = np.stack([[[0.0, 0.0], [640.0, 0.0], [640.0, 480.0], [0.0, 480.0]]] * len(MOUSE.drawn))
+    changes = changes_by_camera(seen())
+    assert strengths_along(ON_FLOOR, TRUTH, changes, np.stack([everywhere] * len(SMALL))) == {"tail": 0.0}
+
+
+def test_a_tail_under_the_floor_shows_nowhere() -> None:
+    below = rearing_mouse(tail_lift=0.5, tail_2_wag=0.0, pelvis_z=20.0)
+    evidence = seen(below)
+    corners, changes = Agreement(MOUSE, SMALL).corners(below), changes_by_camera(evidence)
+    flying = thin_limbs_of(MOUSE, SMALL, on_floor=False)
+    lowest = marker_points(MOUSE, below[None])[0, TIP, 2]
+    assert lowest < -10.0
+    on_floor, free = (strengths_along(thin, below, changes, corners)["tail"] for thin in (ON_FLOOR, flying))
+    assert on_floor < 0.5 < free
+
+
+def test_a_tail_that_is_broad_in_the_pictures_is_left_to_the_masks() -> None:
+    near = tuple(dataclasses.replace(camera, translation=camera.translation / 4.0) for camera in SMALL)
+    tail, corners = thin_limbs_of(MOUSE, near, True)["tail"], Agreement(MOUSE, near).corners(TRUTH)
+    assert tail.lines(TRUTH, changes_by_camera(seen()), corners) == [None, None, None]
+
+
+@pytest.mark.parametrize("body", ["human35", "dog", "planar_arm4"])
+def test_only_a_tail_of_many_joints_is_thin(body: str) -> None:
+    assert chains_of(MOUSE) == ["tail"]
+    assert chains_of(load_body(body)) == []
+
+
+def test_pictures_of_another_size_than_the_empty_one_say_nothing() -> None:
+    changes = {
+        name: Change(one.kinds, one.size, one.picture, one.empty[:-2] if one.empty is not None else None)
+        for name, one in changes_by_camera(seen()).items()
+    }
+    corners = Agreement(MOUSE, SMALL).corners(TRUTH)
+    assert strengths_along(ON_FLOOR, TRUTH, changes, corners) == {}
