@@ -44,7 +44,7 @@ from studio.search.trackers.limbs_elsewhere import (
 from studio.search.trackers.loss_detection import anything_seen
 from studio.search.trackers.reported_limbs import reported_limbs, reported_lost
 from studio.search.trackers.start_candidates import facing
-from studio.search.trackers.thin_limbs import HALF_PLAIN, strengths_along
+from studio.search.trackers.thin_limbs import HALF_PLAIN, lines_along
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
@@ -217,10 +217,10 @@ def check_run(
                     elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
                 pictures = {view.camera: view.picture for view in evidence.views}
                 reported = reported_lost(body, pose, reported_limbs(network, pose, pictures, elsewhere))
-                strengths = strengths_along(thin, pose, changes_by_camera(evidence), off.corners)
+                lines = lines_along(thin, pose, changes_by_camera(evidence), off.corners)
                 contradicted += [
                     ContradictedLimb(frame, limb, *found)
-                    for limb, found in contradicted_limbs(off, elsewhere, reported, strengths).items()
+                    for limb, found in contradicted_limbs(off, elsewhere, reported, lines).items()
                 ]
     check = RunCheck(
         track=chosen.name,
@@ -301,7 +301,7 @@ def contradicted_limbs(
     """
     plain = lines or {}
     lost = {*lost_of(elsewhere), *reported} - plain.keys()
-    lost |= {limb for limb, strength in plain.items() if strength < HALF_PLAIN}
+    lost |= {limb for limb, odds in plain.items() if odds < HALF_PLAIN}
     return {
         limb: (round(share, 3), limb in lost)
         for limb, share in without_sure(off, elsewhere).shares().items()

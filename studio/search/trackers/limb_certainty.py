@@ -66,7 +66,7 @@ CONSTANT, WEIGHTS = 3.90, np.array([1.37, 0.44, 1.81])
 WITNESSED = 3.0
 """Least log-odds of a limb that the pictures show in another place."""
 LINE_ODDS = 20.0
-"""Log-odds of a lost thin limb, per strength of the lines along it below HALF_PLAIN."""
+"""Log-odds of a lost thin limb, by how much less plainly than HALF_PLAIN lines run along it."""
 ENDS, JUMPS = f"{MOVED}ends", f"{MOVED}jumps"
 
 
@@ -99,8 +99,8 @@ class Certainty:
         odds = np.where(bare > LIMB_LOST_SHARE, np.inf, CONSTANT + signs @ WEIGHTS)
         elsewhere = {*lost_of(known), *reported}
         odds = np.where([limb in elsewhere for limb in self.limbs], np.maximum(odds, WITNESSED), odds)
-        for limb, strength in (lines or {}).items():
-            odds[self.limbs.index(limb)] = LINE_ODDS * (HALF_PLAIN - strength)
+        for limb, plain in (lines or {}).items():
+            odds[self.limbs.index(limb)] = LINE_ODDS * (HALF_PLAIN - plain)
         return dict(zip(self.limbs, (1.0 / (1.0 + np.exp(-odds))).tolist(), strict=True))
 
     def signs(self, off: Disagreement, pictures: Mapping[str, Elsewhere]) -> tuple[Array, Array]:

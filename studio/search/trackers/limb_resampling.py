@@ -63,11 +63,13 @@ BELIEF, NEARER = 0.1, 0.6
 reported, if they sum to 1 + BELIEF · NEARER at most: without a higher loss it must have the limb at NEARER of the
 distance. One that has not come to where it is reported must have BETTER_CHAIN of the loss, too: before the body a
 limb is as well everywhere."""
-KEPT_ALONG_LINES, DRAWS_ALONG_LINES, CLIMBING_DRAWS = 12, 300, 40
+KEPT_ALONG_LINES, DRAWS_ALONG_LINES, CLIMBING_DRAWS = 24, 300, 40
 NARROWER = (0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.03, 0.03, 0.02, 0.02)
 """Of a thin limb: how many poses are kept from joint to joint, how many are drawn from each, and how many from each of
 the best of all joints, with these standard deviations, radians."""
-LEAST_LINES, DENIED_LINES = 0.05, 0.5
+SURELY_ALONG = 0.35
+"""Support of a thin limb that is looked for nearby only."""
+LEAST_LINES, DENIED_LINES = 0.1, 0.5
 """What lines must say more (`thin_limbs`) for another pose than for the one found, and by how much they must say more
 where its loss is twice as high."""
 DENIED_DRAWS, DENIED_REFINED = 4096, 16
@@ -254,14 +256,15 @@ def drawn_along_lines(
     starts = [found.pose]
     if last is not None:
         starts.append(_with(found.pose, own, last))
-    straight = _with(found.pose, own, refiner.neutral)
-    kept, weighed = straight[None], 0
-    joints = _joints_of(refiner.body, own)
-    for number, joint in enumerate(joints):
-        drawn = np.concatenate([kept, _drawn(rng, refiner, kept, joint, DRAWS_ALONG_LINES)])
-        weighed += len(drawn)
-        kept = np.array(_best_apart(drawn, -thin.gains(drawn, lines, number + 1), joint, KEPT_ALONG_LINES))
-    poses = np.concatenate([kept, starts])
+    weighed, bent = 0, list[int]()
+    if (thin.support(found.pose, lines) or 0.0) < SURELY_ALONG:
+        kept = _with(found.pose, own, refiner.neutral)[None]
+        for number, joint in enumerate(_joints_of(refiner.body, own), 1):
+            drawn = np.concatenate([kept, _drawn(rng, refiner, kept, joint, DRAWS_ALONG_LINES)])
+            weighed, bent = weighed + len(drawn), [*bent, *joint]
+            kept = np.array(_best_apart(drawn, -thin.gains(drawn, lines, number), bent, KEPT_ALONG_LINES))
+        starts += list(kept)
+    poses = np.array(starts)
     gains = thin.gains(poses, lines)
     lower, upper = refiner.lower[own], refiner.upper[own]
     for spread in NARROWER:

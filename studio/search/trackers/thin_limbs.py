@@ -24,26 +24,32 @@ from studio.search.trackers.refinement import mm_per_pixel
 
 WIDTHS = 3, 9
 """Pixels: the narrowest line that is looked for, and the broadest; broader limbs are in the masks."""
-NOTHING = 0.4
-"""What a place of no limb is expected to show, in clutter: less speaks against a limb."""
+NOTHING, UNSEEN = 0.4, 0.15
+"""How plain a line is expected where there is no limb, in clutter, and what is added to both: a limb may be faint in a
+view. The logarithm of their ratio counts: what two views show and the third one surely does not is no limb."""
 POINTS = 8
 """Along each part of a limb."""
 BEND = 0.1
 """Gain that is lost per radian² of the joints within a limb."""
 UNDER_MM = 30.0
 """mm at a person's size: what lies lower is under the floor."""
-HALF_PLAIN = 0.45
-"""Mean strength of the lines along a thin limb that is as likely lost as not."""
+HALF_PLAIN = 0.15
+"""Mean log odds along a thin limb that is as likely lost as not."""
 LEAST_SEEN = 0.3
 """Share of a limb's points, of all views, that other limbs leave free, at least: hardly a tail is hidden from all."""
 
 
+NEVER = float(np.log(UNSEEN / (UNSEEN + NOTHING)))
+"""The log odds without a line."""
+
+
 class Lines(NamedTuple):
-    """What a view shows around a limb. strength : (DIRECTIONS, h, w) 0 to 1. free : (h, w) where no other limb lies.
+    """What a view shows around a limb. odds : (DIRECTIONS, h, w) log odds for a limb of each direction, as of a line.
+    free : (h, w) where no other limb lies.
     corner : its first pixel, x and y. lowest : mm, height of what is not under the floor.
     """
 
-    strength: Floats
+    odds: Floats
     free: Mask
     corner: tuple[int, int]
     lowest: float
@@ -80,13 +86,13 @@ class ThinLimb:
 
     def gains(self, poses: Array, lines: Sequence[Lines | None], parts: int | None = None) -> Array:
         """(N,) what the lines say for poses (N, D), summed over the views. parts : only so many, from the root."""
-        shown, counted = self._along(poses, lines, parts)
+        shown, _ = self._along(poses, lines, parts)
         bent = ((poses[:, self._inner] - self._neutral[self._inner]) ** 2).sum(axis=1)
-        return (shown - NOTHING * counted).sum(axis=0) / (POINTS * len(self._parts)) - BEND * bent
+        return shown.sum(axis=0) / (POINTS * len(self._parts)) - BEND * bent
 
     def support(self, pose: Array, lines: Sequence[Lines | None]) -> float | None:
-        """The mean strength of the lines along the limb in a pose (D,), little where other limbs hide nearly all of it;
-        None without lines.
+        """The mean log odds along the limb in a pose (D,), little where other limbs hide nearly all of it; None without
+        lines.
         """
         shown, counted = self._along(pose[None], lines)
         possible = POINTS * len(self._parts) * sum(one is not None for one in lines)
@@ -95,14 +101,14 @@ class ThinLimb:
     def _along(
         self, poses: Array, lines: Sequence[Lines | None], parts: int | None = None
     ) -> tuple[Array, Array]:
-        """(V, N) summed strengths, and how many points were counted."""
+        """(V, N) summed log odds, and how many points were counted."""
         ends = limb_ends(self._body, poses)[:, self._parts[:parts]]
         share = (np.arange(POINTS) + 1.0) / POINTS
         points = ends[:, :, 0, None] + (ends[:, :, 1] - ends[:, :, 0])[:, :, None] * share[:, None]
         shown, counted = np.zeros((2, len(lines), len(poses)))
         for number, (camera, view) in enumerate(zip(self._cameras, lines, strict=True)):
             if view is not None:
-                shown[number], counted[number] = _strengths(camera, view, ends, points)
+                shown[number], counted[number] = _odds_along(camera, view, ends, points)
         return shown, counted
 
     def _lines_of(
@@ -122,23 +128,23 @@ class ThinLimb:
             return None
         part = np.s_[low[1] : high[1], low[0] : high[0]]
         others = np.delete(quads, self._parts, axis=0) - low
-        strength = line_strength(change.picture[part], change.empty[part], broad)
-        free = free_of(others, *strength.shape[1:])
+        odds = _odds_of(line_strength(change.picture[part], change.empty[part], broad))
+        free = free_of(others, *odds.shape[1:])
         if change.mask is not None:
             free &= ~is_broad(change.mask[part], broad)
-        return Lines(strength, free, (int(low[0]), int(low[1])), lowest)
+        return Lines(odds, free, (int(low[0]), int(low[1])), lowest)
 
 
-def strengths_along(
+def lines_along(
     limbs: Mapping[str, ThinLimb], pose: Array, changes: Mapping[str, Change], corners: Array
 ) -> dict[str, float]:
     """By thin limb of a pose (D,) how plainly lines run along it. Others : as of `ThinLimb.lines`."""
     found = {limb: one.support(pose, one.lines(pose, changes, corners)) for limb, one in limbs.items()}
-    return {limb: strength for limb, strength in found.items() if strength is not None}
+    return {limb: odds for limb, odds in found.items() if odds is not None}
 
 
-def _strengths(camera: Camera, view: Lines, ends: Array, points: Array) -> tuple[Array, Array]:
-    """(N,) summed strengths, and how many points were counted, of the axes of N limbs. ends : (N, P, 2, 3). points :
+def _odds_along(camera: Camera, view: Lines, ends: Array, points: Array) -> tuple[Array, Array]:
+    """(N,) summed log odds, and how many points were counted, of the axes of N limbs. ends : (N, P, 2, 3). points :
     (N, P, K, 3) along them.
     """
     pixels, along = project(camera, points)[0], project(camera, ends)[0]
@@ -153,8 +159,12 @@ def _strengths(camera: Camera, view: Lines, ends: Array, points: Array) -> tuple
     x, y = (np.where(inside, places[..., axis], 0) for axis in (0, 1))
     under = points[..., 2] < view.lowest
     counts = inside & view.free[y, x] | under
-    strength = view.strength[np.broadcast_to(direction[..., None], x.shape), y, x]
-    return np.where(counts & ~under, strength, 0.0).sum(axis=(1, 2)), counts.sum(axis=(1, 2)).astype(float)
+    odds = np.where(under, NEVER, view.odds[np.broadcast_to(direction[..., None], x.shape), y, x])
+    return np.where(counts, odds, 0.0).sum(axis=(1, 2)), counts.sum(axis=(1, 2)).astype(float)
+
+
+def _odds_of(strength: Floats) -> Floats:
+    return np.log((UNSEEN + strength) / np.float32(UNSEEN + NOTHING))
 
 
 def _of_first_joint(body: BodyModel, own: Sequence[int]) -> NDArray[np.int64]:

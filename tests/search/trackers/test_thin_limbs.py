@@ -19,7 +19,7 @@ from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
 from studio.search.trackers.limb_resampling import chains_of, thin_limbs_of
 from studio.search.trackers.limbs_elsewhere import Change, changes_by_camera
-from studio.search.trackers.thin_limbs import HALF_PLAIN, strengths_along
+from studio.search.trackers.thin_limbs import HALF_PLAIN, lines_along
 from studio.search.trackers.tracker import Estimate, FrameResult, start_of
 
 MOUSE = load_body("mouse31")
@@ -64,9 +64,9 @@ def refined(evidence: FrameEvidence, **knobs: bool) -> FrameResult:
     )
 
 
-def strength_of(pose: Array, evidence: FrameEvidence) -> dict[str, float]:
+def along(pose: Array, evidence: FrameEvidence) -> dict[str, float]:
     corners = Agreement(MOUSE, SMALL).corners(pose)
-    return strengths_along(ON_FLOOR, pose, changes_by_camera(evidence), corners)
+    return lines_along(ON_FLOOR, pose, changes_by_camera(evidence), corners)
 
 
 def test_a_tail_is_found_that_no_mask_shows() -> None:
@@ -86,15 +86,15 @@ def test_a_tail_along_no_line_is_lost() -> None:
 
 
 def test_lines_are_plain_along_a_tail_that_is_right() -> None:
-    assert strength_of(TRUTH, seen())["tail"] > 0.8
-    assert strength_of(ASTRAY, seen())["tail"] < HALF_PLAIN
+    assert along(TRUTH, seen())["tail"] > 0.5
+    assert along(ASTRAY, seen())["tail"] < HALF_PLAIN
 
 
 def test_nothing_is_said_without_an_empty_view_and_a_tail_hidden_from_all_is_lost() -> None:
-    assert strength_of(TRUTH, seen(empty=False)) == {}
+    assert along(TRUTH, seen(empty=False)) == {}
     everywhere = np.stack([[[0.0, 0.0], [640.0, 0.0], [640.0, 480.0], [0.0, 480.0]]] * len(MOUSE.drawn))
     changes = changes_by_camera(seen())
-    assert strengths_along(ON_FLOOR, TRUTH, changes, np.stack([everywhere] * len(SMALL))) == {"tail": 0.0}
+    assert lines_along(ON_FLOOR, TRUTH, changes, np.stack([everywhere] * len(SMALL))) == {"tail": 0.0}
 
 
 def test_a_tail_under_the_floor_shows_nowhere() -> None:
@@ -104,8 +104,8 @@ def test_a_tail_under_the_floor_shows_nowhere() -> None:
     flying = thin_limbs_of(MOUSE, SMALL, on_floor=False)
     lowest = marker_points(MOUSE, below[None])[0, TIP, 2]
     assert lowest < -10.0
-    on_floor, free = (strengths_along(thin, below, changes, corners)["tail"] for thin in (ON_FLOOR, flying))
-    assert on_floor < 0.5 < free
+    on_floor, free = (lines_along(thin, below, changes, corners)["tail"] for thin in (ON_FLOOR, flying))
+    assert on_floor < 0.0 < free
 
 
 def test_a_tail_that_is_broad_in_the_pictures_is_left_to_the_masks() -> None:
@@ -126,4 +126,4 @@ def test_pictures_of_another_size_than_the_empty_one_say_nothing() -> None:
         for name, one in changes_by_camera(seen()).items()
     }
     corners = Agreement(MOUSE, SMALL).corners(TRUTH)
-    assert strengths_along(ON_FLOOR, TRUTH, changes, corners) == {}
+    assert lines_along(ON_FLOOR, TRUTH, changes, corners) == {}
