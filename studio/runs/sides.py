@@ -35,6 +35,7 @@ from studio.runs.tracks import (
 from studio.search.trackers.clip_mending import mended_clip
 from studio.search.trackers.frame_refinement import descent
 from studio.search.trackers.hidden_areas import without_hidden
+from studio.search.trackers.limb_resampling import chains_of
 from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.refinement import Distances, mm_at
 from studio.search.trackers.tracker import LIMB_LOST
@@ -106,7 +107,8 @@ def _corrected(
     """The corrections of a run whose raw track it is, in words; if there are any, they are stored."""
     settings = MaskSettings(run)
     evidence = partial(_look_at, problems, settings, read)
-    how = descent(settings.of(run.record.first).refinement)
+    refinement = settings.of(run.record.first).refinement
+    how, kept = descent(refinement), chains_of(problems.body) if refinement.thin_limbs else ()
     body, cameras, poses = problems.body, problems.cameras, dict(zip(track.frames, track.poses, strict=True))
     with run.results() as results:
 
@@ -120,7 +122,7 @@ def _corrected(
         ]
         fps = run.record.fps
         corrected, words = mended_clip(
-            body, cameras, track.frames, track.poses, named, fps, silhouettes_of, how, progress
+            body, cameras, track.frames, track.poses, named, fps, silhouettes_of, how, progress, kept
         )
     if not words:
         return ()

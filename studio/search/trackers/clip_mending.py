@@ -3,7 +3,7 @@ back (`turning_back`), exchanged sides, left and right, front and back, are put 
 limbs are bridged from both ends (`limb_bridging`). Bridged first, exchanged legs are put right piece by piece.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from studio.body.model import BodyModel
 from studio.foundations.arrays import Array, Indices
@@ -26,11 +26,13 @@ def mended_clip(
     silhouettes_of: SilhouettesOf,
     settings: RefinementSettings,
     progress: Progress = no_progress,
+    kept: Collection[str] = (),
 ) -> tuple[Array, tuple[str, ...]]:
     """The clip's poses (K, D) mended, and what was changed, a line each; other frames keep their poses.
 
     frames : (K,) ascending. poses : (K, D). named : of each frame the limbs that the tracker called lost. settings : of
-    the descents. progress : the step at hand; its exception ends the work. Raises what `silhouettes_of` raises.
+    the descents. progress : the step at hand; its exception ends the work. kept : limbs that are not
+    bridged, as lines in the pictures were followed (`thin_limbs`). Raises what `silhouettes_of` raises.
     """
     progress("looking for turns", 0, 0)
     faced, turns = with_facing_right(body, cameras, frames, poses, fps, silhouettes_of, settings)
@@ -38,6 +40,6 @@ def mended_clip(
         body, cameras, frames, faced, fps, silhouettes_of, settings, progress
     )
     bridged, bridges = with_limbs_bridged(
-        body, cameras, frames, corrected, named, fps, silhouettes_of, settings, progress
+        body, cameras, frames, corrected, named, fps, silhouettes_of, settings, progress, kept
     )
     return bridged, tuple(one.words for one in (*turns, *changes, *bridges))

@@ -12,7 +12,7 @@ with d, how far the limb's ends move from frame to frame, and σ, how far they u
 convolutional codes", 1967.)
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,14 +72,16 @@ def with_limbs_bridged(
     silhouettes_of: SilhouettesOf,
     settings: RefinementSettings | None = None,
     progress: Progress = no_progress,
+    kept: Collection[str] = (),
 ) -> tuple[Array, tuple[Bridge, ...]]:
     """A tracked clip with its doubtful limbs bridged, (K, D), and what was changed; other frames keep their poses.
 
     frames : (K,) ascending. poses : (K, D). named : of each frame the limbs that the tracker called lost. settings : of
-    the descents. progress : a step for each limb. Raises what `silhouettes_of` and `progress` raise.
+    the descents. progress : a step for each limb. kept : limbs that stay as they are bent: silhouettes lack them.
+    Raises what `silhouettes_of` and `progress` raise.
     """
-    work = _Work(body, cameras, frames, poses, fps, silhouettes_of, settings or RefinementSettings())
-    for limb in dict.fromkeys(limb_names(body)):
+    work = _Work(body, cameras, frames, poses, fps, silhouettes_of, settings or RefinementSettings(), kept)
+    for limb in dict.fromkeys(name for name in limb_names(body) if name not in kept):
         lost = np.array([limb in names for names in named], np.bool_)
         stretches = work.stretches(limb, lost)
         tries = sum(3 * (end - begin - 1) for one in stretches for begin, end in work.spans(*one))
@@ -101,6 +103,7 @@ class _Work:
         fps: float,
         silhouettes_of: SilhouettesOf,
         settings: RefinementSettings,
+        kept: Collection[str],
     ) -> None:
         self._body, self._frames, self._fps = body, frames, fps
         self.poses, self.bridges = poses.copy(), list[Bridge]()
@@ -109,6 +112,7 @@ class _Work:
         self._seen = rows_seen(body, cameras, frames, silhouettes_of, settings)
         refiner = Refiner(body, tuple(cameras), settings)
         self._own = {limb: bent_by(refiner, limb) for limb in dict.fromkeys(self._names.tolist())}
+        self._kept = [angle for limb in kept for angle in self._own[limb]]
 
     def stretches(self, limb: str, lost: NDArray[np.bool_]) -> list[tuple[int, int]]:
         """Rows from, and after, between which a limb is doubtful. lost : (K,) whether the tracker named it."""
@@ -195,7 +199,8 @@ class _Work:
         pose = self.poses[row].copy()
         pose[self._own[limb]] = angles
         refiner, silhouettes = self._seen(row)
-        refined = refiner.refine(pose, silhouettes).pose
+        refined = refiner.refine(pose, silhouettes).pose.copy()
+        refined[self._kept] = pose[self._kept]
         self.tried()
         return refined
 

@@ -33,7 +33,7 @@ BEND = 0.1
 """Gain that is lost per radian² of the joints within a limb."""
 UNDER_MM = 30.0
 """mm at a person's size: what lies lower is under the floor."""
-HALF_PLAIN = 0.15
+HALF_PLAIN = 0.05
 """Mean log odds along a thin limb that is as likely lost as not."""
 LEAST_SEEN = 0.3
 """Share of a limb's points, of all views, that other limbs leave free, at least: hardly a tail is hidden from all."""
