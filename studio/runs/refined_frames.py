@@ -22,6 +22,7 @@ from studio.runs.tracks import Track
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
 from studio.search.trackers.hidden_areas import without_hidden
+from studio.search.trackers.limb_resampling import bent_by, chains_of
 from studio.search.trackers.loss_detection import Onlooker, Sight
 from studio.search.trackers.refinement import Distances, FrameLoss, RefinementSettings, Refiner, mm_at
 from studio.search.trackers.refinement_over_time import HELD, MovementRefiner, Window, windows
@@ -116,6 +117,10 @@ class _Work:
         self._results, self._settings = run.results(), MaskSettings(run)
         self._record, self._track, self._knobs, self._report = run.record, track, knobs, read
         self._refiner = Refiner(body, self._cameras, knobs)
+        follows_lines = self._settings.of(run.record.first).refinement.thin_limbs
+        thin = chains_of(body) if follows_lines else []
+        self._as_tracked = [angle for limb in thin for angle in bent_by(self._refiner, limb)]
+        """Angles of limbs that were tracked along lines in the pictures: silhouettes lack them."""
         self._onlooker = Onlooker(body, self._cameras)
         self._problems = ProblemSource(session, body, self._cameras)
         self._poses, self._agreement = track.poses.copy(), track.confidence.copy()
@@ -193,7 +198,9 @@ class _Work:
         return without_hidden(silhouette_distances(evidence), refiner.cameras, mm, known)
 
     def _keep(self, row: int, pose: Array, sight: Callable[[Array], Sight]) -> None:
-        self._before.append(sight(self._track.poses[row]).overlap)
+        tracked, pose = self._track.poses[row], pose.copy()
+        pose[self._as_tracked] = tracked[self._as_tracked]
+        self._before.append(sight(tracked).overlap)
         self._poses[row], self._agreement[row] = pose, sight(pose).overlap
         self._after.append(float(self._agreement[row]))
 

@@ -1,6 +1,7 @@
 """The parts of bridging limbs: where a limb is doubtful, which path is best, and which margins; on points, by hand."""
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -219,7 +220,7 @@ def test_margins_end_with_the_clip_and_where_frames_are_missing() -> None:
 def test_ends_are_those_of_the_limbs_parts_at_a_persons_size(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limb_bridging, "scale_of", lambda body: 2.0)
     poses = np.stack([BODY.neutral, BODY.neutral + 0.1])
-    work = _Work(BODY, (), np.arange(2), poses, 30.0, dict, RefinementSettings())
+    work = _Work(BODY, (), np.arange(2), poses, 30.0, dict, RefinementSettings(), ())
     parts = [
         n for n, limb in enumerate(BODY.drawn) if limb.name in ("left upper arm", "left forearm", "left hand")
     ]
@@ -239,3 +240,19 @@ def test_bridges_are_told_in_the_order_of_their_frames_and_limbs(monkeypatch: py
     poses = np.repeat(BODY.neutral[None], 3, axis=0)
     _, found = limb_bridging.with_limbs_bridged(BODY, (), np.arange(3), poses, named, 30.0, dict)
     assert [one.limb for one in found] == ["left arm", "right arm", "left leg"]
+
+
+def test_limbs_that_are_kept_are_neither_bridged_nor_bent(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(_Work, "stretches", lambda self, limb, lost: asked.append(limb) or [])
+    poses = np.repeat(BODY.neutral[None], 3, axis=0)
+    limb_bridging.with_limbs_bridged(BODY, (), np.arange(3), poses, [(), (), ()], 30.0, dict, kept=[LIMB])
+    assert LIMB not in asked
+    assert "right arm" in asked
+    work = _Work(BODY, (), np.arange(3), poses, 30.0, dict, RefinementSettings(), [LIMB])
+    everything = SimpleNamespace(refine=lambda pose, seen: SimpleNamespace(pose=pose + 1.0))
+    work._seen = lambda row: (everything, ())
+    other = "right arm"
+    found = work._refined(1, other, np.full(len(work._own[other]), 0.5))
+    np.testing.assert_array_equal(found[work._own[LIMB]], BODY.neutral[work._own[LIMB]])
+    np.testing.assert_allclose(found[work._own[other]], 1.5)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from functools import partial
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -14,7 +15,11 @@ from studio.body.forward_kinematics import marker_points
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
+from studio.runs.checking import contradicted_limbs
+from studio.runs.live.live_request import live_changes
+from studio.runs.refined_frames import _Work
 from studio.search.likelihood.catalogue import WEIGHTINGS
+from studio.search.settings import default_settings, settings_from_values
 from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
 from studio.search.trackers.limb_resampling import chains_of, thin_limbs_of
@@ -127,3 +132,30 @@ def test_pictures_of_another_size_than_the_empty_one_say_nothing() -> None:
     }
     corners = Agreement(MOUSE, SMALL).corners(TRUTH)
     assert lines_along(ON_FLOOR, TRUTH, changes, corners) == {}
+
+
+def test_a_check_asks_the_lines_alone_of_a_tail() -> None:
+    agreement, silhouettes = Agreement(MOUSE, SMALL), tuple(silhouettes_by_camera(seen()).values())
+    off = agreement.of(ASTRAY, silhouettes)
+    assert "tail" in contradicted_limbs(off, {}, ())
+    assert "tail" not in contradicted_limbs(off, {}, (), {"tail": HALF_PLAIN + 0.1})
+    share, by_pictures = contradicted_limbs(off, {}, (), {"tail": HALF_PLAIN - 0.1})["tail"]
+    assert (round(off.shares()["tail"], 3), True) == (share, by_pictures)
+
+
+def test_older_runs_and_live_ones_do_not_follow_lines() -> None:
+    names = "annealed", "edge-region-silhouette"
+    assert default_settings(*names).refinement.thin_limbs
+    assert not settings_from_values(*names, {}).refinement.thin_limbs
+    assert not live_changes({})["thin_limbs"]
+    assert live_changes({"thin_limbs": True})["thin_limbs"]
+
+
+def test_refining_a_clip_leaves_limbs_as_they_were_tracked_along_lines() -> None:
+    work = object.__new__(_Work)
+    work._as_tracked, work._before, work._after = [1], [], []
+    work._track = SimpleNamespace(poses=np.zeros((1, 3)))
+    work._poses, work._agreement = np.zeros((1, 3)), np.zeros(1)
+    work._keep(0, np.ones(3), lambda pose: SimpleNamespace(overlap=pose.sum()))
+    np.testing.assert_array_equal(work._poses, [[1.0, 0.0, 1.0]])
+    assert work._after == [2.0]
