@@ -27,6 +27,7 @@ from studio.search.trackers.limb_certainty import CertaintyOfLimbs
 from studio.search.trackers.limb_colours import ColouredView, LimbColours
 from studio.search.trackers.limb_resampling import (
     DOUBTFUL_SHARE,
+    SURELY_ALONG,
     Hypothesis,
     SeenFrame,
     drawn_along_lines,
@@ -34,6 +35,7 @@ from studio.search.trackers.limb_resampling import (
     recoloured,
     redrawn,
     thin_limbs_of,
+    turned_along_lines,
 )
 from studio.search.trackers.limbs_elsewhere import Change, Elsewhere, LimbsElsewhere, lost_of
 from studio.search.trackers.random_numbers import keyed_generator
@@ -329,7 +331,7 @@ class _FrameInWork:
     def redraw_along_lines(self, redraw: bool) -> None:
         """See where lines in the pictures run, and resample thin limbs along them. redraw : whether they are."""
         for number, (limb, thin) in enumerate(self._tools.thin.items()):
-            lines = thin.lines(self.pose, self._changes, self._tools.agreement.corners(self.pose))
+            lines = self._lines_of(thin, self.pose)
             if not any(one is not None for one in lines):
                 continue
             self._lines[limb] = lines
@@ -338,7 +340,18 @@ class _FrameInWork:
             frame = self._seen(self.silhouettes)
             loss = frame.refiner.loss_with_pull(self.pose, self.silhouettes)
             began, last = Hypothesis(self.pose, loss, self.off), self._result.carried.previous_estimate
-            self._take(began, *drawn_along_lines(self._rng(4 + number), began, frame, thin, lines, last))
+            rng = self._rng(4 + number)
+            self._take(began, *drawn_along_lines(rng, began, frame, thin, lines, last))
+            if (thin.support(self.pose, lines) or 0.0) < SURELY_ALONG:
+                began = frame.hypothesis(self.pose)
+                self._take(
+                    began,
+                    *turned_along_lines(rng, began, frame, thin, functools.partial(self._lines_of, thin)),
+                )
+                self._lines[limb] = self._lines_of(thin, self.pose)
+
+    def _lines_of(self, thin: ThinLimb, pose: Array) -> list[Lines | None]:
+        return thin.lines(pose, self._changes, self._tools.agreement.corners(pose))
 
     def along_lines(self) -> dict[str, float]:
         """By thin limb how plainly lines run along it, where they are seen."""

@@ -69,6 +69,8 @@ NARROWER = (0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.03, 0.03, 0.02, 0.02)
 the best of all joints, with these standard deviations, radians."""
 SURELY_ALONG = 0.35
 """Support of a thin limb that is looked for nearby only."""
+TURNED, LEAST_TURNED = 0.7, 0.15
+"""Radians by which the body of a thin limb that is not surely found is turned, and what must be said more for that."""
 LEAST_LINES, DENIED_LINES = 0.1, 0.5
 """What lines must say more (`thin_limbs`) for another pose than for the one found, and by how much they must say more
 where its loss is twice as high."""
@@ -286,6 +288,33 @@ def drawn_along_lines(
     return found, weighed
 
 
+def turned_along_lines(
+    rng: np.random.Generator,
+    found: Hypothesis,
+    frame: SeenFrame,
+    thin: ThinLimb,
+    lines_of: Callable[[Array], Sequence[Lines | None]],
+) -> tuple[Hypothesis, int]:
+    """The hypothesis, or the body turned a little about the vertical with its thin limb along lines, if these and the
+    silhouettes say clearly more for it; and the number of poses compared. A crouching animal is round, and its tail
+    alone shows where it points. lines_of : of a pose (D,).
+    """
+    began_with, weighed = found, 0
+    most = float(thin.gains(found.pose[None], lines_of(found.pose))[0]) + LEAST_TURNED
+    for by in (TURNED, -TURNED):
+        turned = turned_pose(frame.refiner.body, began_with.pose, by)
+        if turned is None:
+            break
+        refined = frame.hypothesis(frame.refiner.refine(turned, frame.silhouettes).pose)
+        lines = lines_of(refined.pose)
+        other, drawn = drawn_along_lines(rng, refined, frame, thin, lines)
+        gain, weighed = float(thin.gains(other.pose[None], lines)[0]), weighed + drawn
+        worth = gain - DENIED_LINES * (other.loss / began_with.loss - 1.0)
+        if worth > most:
+            found, most = other, worth
+    return found, weighed
+
+
 def _with(pose: Array, own: Sequence[int], other: Array) -> Array:
     """(D,) a pose with some angles of another one."""
     changed = pose.copy()
@@ -426,9 +455,9 @@ def has_tail(body: BodyModel) -> bool:
     return any(limbs.count(limb) > MOST_TOGETHER for limb in dict.fromkeys(limbs))
 
 
-def turned_pose(body: BodyModel, pose: Array) -> Array | None:
-    """(D,) a pose turned by half a turn about the vertical through the middle of its trunk; None of a body that is
-    fixed to the world.
+def turned_pose(body: BodyModel, pose: Array, by: float = np.pi) -> Array | None:
+    """(D,) a pose turned about the vertical through the middle of its trunk; None of a body that is fixed to the world.
+    by : radians.
     """
     parameters = root_parameters(body)
     trunk = [number for number, limb in enumerate(body.drawn) if limb.part == "trunk"]
@@ -436,9 +465,9 @@ def turned_pose(body: BodyModel, pose: Array) -> Array | None:
         return None
     root = next(number for number, joint in enumerate(body.joints) if joint.parent < 0)
     frame, middle = joint_frames(body, pose)[0, root], limb_ends(body, pose)[0, trunk].mean(axis=(0, 1))
-    half = np.diag([-1.0, -1.0, 1.0])
-    target = half @ frame
-    target[:, 3] += middle - half @ middle
+    turn = np.array([[np.cos(by), -np.sin(by), 0.0], [np.sin(by), np.cos(by), 0.0], [0.0, 0.0, 1.0]])
+    target = turn @ frame
+    target[:, 3] += middle - turn @ middle
     return within_limits(body, with_root_at(body, root, parameters, pose, target))
 
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.body.scale import scale_of
-from studio.evidence.line_strength import DIRECTIONS, LONG, free_of, is_broad, line_strength
 from studio.foundations.arrays import Array, Floats, Mask
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.limbs_elsewhere import Change
+from studio.search.trackers.line_strength import DIRECTIONS, LONG, free_of, is_broad, line_strength
 from studio.search.trackers.refinement import mm_per_pixel
 
 WIDTHS = 3, 9

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from studio.evidence.line_strength import DIRECTIONS, free_of, is_broad, line_strength
 from studio.foundations.arrays import Bytes
+from studio.search.trackers.line_strength import DIRECTIONS, free_of, is_broad, line_strength
 
 MIDDLE, SIZE = 40, 81
 
