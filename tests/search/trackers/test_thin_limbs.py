@@ -20,9 +20,10 @@ from studio.runs.live.live_request import live_changes
 from studio.runs.refined_frames import _Work
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import default_settings, settings_from_values
+from studio.search.trackers import limb_resampling
 from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
-from studio.search.trackers.limb_resampling import chains_of, thin_limbs_of
+from studio.search.trackers.limb_resampling import Hypothesis, chains_of, thin_limbs_of
 from studio.search.trackers.limbs_elsewhere import Change, changes_by_camera
 from studio.search.trackers.thin_limbs import HALF_PLAIN, lines_along
 from studio.search.trackers.tracker import Estimate, FrameResult, start_of
@@ -159,3 +160,47 @@ def test_refining_a_clip_leaves_limbs_as_they_were_tracked_along_lines() -> None
     work._keep(0, np.ones(3), lambda pose: SimpleNamespace(overlap=pose.sum()))
     np.testing.assert_array_equal(work._poses, [[1.0, 0.0, 1.0]])
     assert work._after == [2.0]
+
+
+@pytest.mark.parametrize(
+    ("gains", "losses", "turned"),
+    [
+        ((0.5, 0.9, 0.1), (1.0, 1.0, 1.0), 0),
+        ((0.5, 0.9, 0.1), (1.0, 2.0, 1.0), None),
+        ((0.5, 0.6, 0.6), (1.0, 1.0, 0.7), 1),
+        ((0.5, 0.6, 0.6), (1.0, 1.0, 1.0), None),
+    ],
+)
+def test_a_round_animal_is_turned_where_its_tail_and_the_silhouettes_say_more_for_it(
+    monkeypatch: pytest.MonkeyPatch, gains: tuple[float, ...], losses: tuple[float, ...], turned: int | None
+) -> None:
+    """Of the pose as found and of both turns what lines gain, and the losses."""
+    poses: list[Array] = []
+
+    def hypothesis(pose: Array) -> Hypothesis:
+        if not any(np.array_equal(pose, known) for known in poses):
+            poses.append(pose)
+        return Hypothesis(pose, losses[number_of(pose)], None)
+
+    def number_of(pose: Array) -> int:
+        return next(n for n, known in enumerate(poses) if np.array_equal(pose, known))
+
+    def gain_of(posed: Array, lines: object) -> Array:
+        return np.array([gains[number_of(posed[0])]])
+
+    frame = SimpleNamespace(
+        refiner=SimpleNamespace(body=MOUSE, refine=lambda pose, seen: SimpleNamespace(pose=pose)),
+        silhouettes=(),
+        hypothesis=hypothesis,
+    )
+    monkeypatch.setattr(limb_resampling, "drawn_along_lines", lambda rng, found, *others: (found, 7))
+    began = hypothesis(TRUTH)
+    found, weighed = limb_resampling.turned_along_lines(
+        np.random.default_rng(0), began, frame, SimpleNamespace(gains=gain_of), lambda pose: []
+    )
+    assert weighed == 14
+    assert number_of(found.pose) == (0 if turned is None else turned + 1)
+    heading = [entry.name for entry in MOUSE.parameters].index("heading")
+    assert (found.pose[heading] - TRUTH[heading]) == pytest.approx(
+        (0.0, 0.7, -0.7)[number_of(found.pose)], abs=0.1
+    )
