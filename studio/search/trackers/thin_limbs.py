@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
@@ -70,7 +69,8 @@ class ThinLimb:
         parts = [body.drawn[number] for number in self._parts]
         self._length = sum(abs(part.length) for part in parts)
         self._breadth = float(np.mean([part.radius_start + part.radius_end for part in parts]))
-        self._inner, self._neutral = self.own[len(_of_first_joint(body, own)) :], body.neutral
+        first = next(joint for joint in body.joints if set(joint.parameters) & set(own))
+        self._inner, self._neutral = [n for n in own if n not in first.parameters], body.neutral
 
     def lines(self, pose: Array, changes: Mapping[str, Change], corners: Array) -> list[Lines | None]:
         """What each view shows around the limb's root in a pose (D,); None of a view without an empty one, or in which
@@ -165,9 +165,3 @@ def _odds_along(camera: Camera, view: Lines, ends: Array, points: Array) -> tupl
 
 def _odds_of(strength: Floats) -> Floats:
     return np.log((UNSEEN + strength) / np.float32(UNSEEN + NOTHING))
-
-
-def _of_first_joint(body: BodyModel, own: Sequence[int]) -> NDArray[np.int64]:
-    """Those of some angles that the first joint has that they turn."""
-    first = next(joint for joint in body.joints if any(angle in own for angle in joint.parameters))
-    return np.array([angle for angle in own if angle in first.parameters], np.int64)
