@@ -69,8 +69,8 @@ NARROWER = (0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.03, 0.03, 0.02, 0.02)
 the best of all joints, with these standard deviations, radians."""
 SURELY_ALONG = 0.35
 """Support of a thin limb that is looked for nearby only."""
-TURNED, LEAST_TURNED = 0.7, 0.15
-"""Radians by which the body of a thin limb that is not surely found is turned, and what must be said more for that."""
+TURNED = 0.7
+"""Radians by which the body of a thin limb that is not surely found is turned."""
 LEAST_LINES, DENIED_LINES = 0.1, 0.5
 """What lines must say more (`thin_limbs`) for another pose than for the one found, and by how much they must say more
 where its loss is twice as high."""
@@ -295,12 +295,13 @@ def turned_along_lines(
     thin: ThinLimb,
     lines_of: Callable[[Array], Sequence[Lines | None]],
 ) -> tuple[Hypothesis, int]:
-    """The hypothesis, or the body turned a little about the vertical with its thin limb along lines, if these and the
-    silhouettes say clearly more for it; and the number of poses compared. A crouching animal is round, and its tail
-    alone shows where it points. lines_of : of a pose (D,).
+    """The hypothesis, or the body turned a little about the vertical with its thin limb along lines, if both these and
+    the silhouettes say more for it; and the number of poses compared. A crouching animal is round, and its tail shows
+    where it points; of one that stands up no silhouette shows it, and the tail alone misleads. lines_of : of a pose
+    (D,).
     """
     began_with, weighed = found, 0
-    most = float(thin.gains(found.pose[None], lines_of(found.pose))[0]) + LEAST_TURNED
+    most = float(thin.gains(found.pose[None], lines_of(found.pose))[0]) + LEAST_LINES
     for by in (TURNED, -TURNED):
         turned = turned_pose(frame.refiner.body, began_with.pose, by)
         if turned is None:
@@ -309,9 +310,8 @@ def turned_along_lines(
         lines = lines_of(refined.pose)
         other, drawn = drawn_along_lines(rng, refined, frame, thin, lines)
         gain, weighed = float(thin.gains(other.pose[None], lines)[0]), weighed + drawn
-        worth = gain - DENIED_LINES * (other.loss / began_with.loss - 1.0)
-        if worth > most:
-            found, most = other, worth
+        if gain > most and other.loss < BETTER_TURNED * began_with.loss:
+            found, most = other, gain
     return found, weighed
 
 

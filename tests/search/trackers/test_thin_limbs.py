@@ -165,10 +165,10 @@ def test_refining_a_clip_leaves_limbs_as_they_were_tracked_along_lines() -> None
 @pytest.mark.parametrize(
     ("gains", "losses", "turned"),
     [
-        ((0.5, 0.9, 0.1), (1.0, 1.0, 1.0), 0),
-        ((0.5, 0.9, 0.1), (1.0, 2.0, 1.0), None),
-        ((0.5, 0.6, 0.6), (1.0, 1.0, 0.7), 1),
-        ((0.5, 0.6, 0.6), (1.0, 1.0, 1.0), None),
+        ((0.5, 0.9, 0.1), (1.0, 0.9, 1.0), 0),
+        ((0.5, 0.9, 0.1), (1.0, 1.0, 0.5), None),
+        ((0.5, 0.7, 0.8), (1.0, 0.9, 0.9), 1),
+        ((0.5, 0.55, 0.5), (1.0, 0.5, 0.5), None),
     ],
 )
 def test_a_round_animal_is_turned_where_its_tail_and_the_silhouettes_say_more_for_it(
