@@ -343,12 +343,9 @@ class _FrameInWork:
             rng = self._rng(4 + number)
             self._take(began, *drawn_along_lines(rng, began, frame, thin, lines, last))
             if (thin.support(self.pose, lines) or 0.0) < SURELY_ALONG:
-                began = frame.hypothesis(self.pose)
-                self._take(
-                    began,
-                    *turned_along_lines(rng, began, frame, thin, functools.partial(self._lines_of, thin)),
-                )
-                self._lines[limb] = self._lines_of(thin, self.pose)
+                began, lines_of = frame.hypothesis(self.pose), functools.partial(self._lines_of, thin)
+                if self._take(began, *turned_along_lines(rng, began, frame, thin, lines_of)):
+                    self._lines[limb] = lines_of(self.pose)
 
     def _lines_of(self, thin: ThinLimb, pose: Array) -> list[Lines | None]:
         return thin.lines(pose, self._changes, self._tools.agreement.corners(pose))

@@ -282,7 +282,8 @@ def drawn_along_lines(
     began_with = found
     for row in np.argsort(-gains, kind="stable")[:REFINED_DRAWS]:
         loss = frame.refiner.loss_with_pull(poses[row], frame.silhouettes)
-        worth = float(gains[row] - DENIED_LINES * max(loss / began_with.loss - 1.0, 0.0))
+        denied = max(loss - began_with.loss, 0.0) / max(began_with.loss, 1.0)
+        worth = float(gains[row] - DENIED_LINES * denied)
         if worth > most:
             found, most = frame.hypothesis(poses[row]), worth
     return found, weighed
