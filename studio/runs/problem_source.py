@@ -26,7 +26,7 @@ from studio.runs.run_footage import filmed_cameras
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.likelihood.silhouette_areas import HALF, silhouettes_of
 from studio.search.settings import RunSettings
-from studio.search.trackers.limb_resampling import chains_of
+from studio.search.trackers.frame_refinement import followed_along_lines
 from studio.search.trackers.loss_detection import anything_seen, shown_by
 from studio.search.trackers.recovery_settings import OFF
 from studio.search.trackers.tracker import FrameLikelihood
@@ -67,7 +67,6 @@ class ProblemSource:
         self._backgrounds = Backgrounds(self.footage)
         self._executor = executor
         self._views = views
-        self._has_thin_limbs = bool(chains_of(body))
         self._keeping, self._making = threading.Lock(), threading.Lock()
         self._coming: tuple[Hashable, Future[FrameLikelihood]] | None = None
         self._latest: tuple[int, RunSettings, FrameLikelihood] | None = None
@@ -105,7 +104,7 @@ class ProblemSource:
                     settings.evidence,
                     WEIGHTINGS[settings.weighting_name].edge_kind,
                     self._views,
-                    with_empty=self._has_thin_limbs and settings.refinement.thin_limbs,
+                    with_empty=bool(followed_along_lines(self.body, settings.refinement)),
                 )
                 evidence = self._keep(self._evidence, key, maker.evidence(frame))
             return evidence

@@ -21,8 +21,9 @@ from studio.runs.run_footage import filmed_cameras
 from studio.runs.tracks import Track
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
+from studio.search.trackers.frame_refinement import followed_along_lines
 from studio.search.trackers.hidden_areas import without_hidden
-from studio.search.trackers.limb_resampling import bent_by, chains_of
+from studio.search.trackers.limb_resampling import bent_by
 from studio.search.trackers.loss_detection import Onlooker, Sight
 from studio.search.trackers.refinement import Distances, FrameLoss, RefinementSettings, Refiner, mm_at
 from studio.search.trackers.refinement_over_time import HELD, MovementRefiner, Window, windows
@@ -117,9 +118,8 @@ class _Work:
         self._results, self._settings = run.results(), MaskSettings(run)
         self._record, self._track, self._knobs, self._report = run.record, track, knobs, read
         self._refiner = Refiner(body, self._cameras, knobs)
-        follows_lines = self._settings.of(run.record.first).refinement.thin_limbs
-        thin = chains_of(body) if follows_lines else []
-        self._as_tracked = [angle for limb in thin for angle in bent_by(self._refiner, limb)]
+        kept = followed_along_lines(body, self._settings.of(run.record.first).refinement)
+        self._as_tracked = [angle for limb in kept for angle in bent_by(body, limb)]
         """Angles of limbs that were tracked along lines in the pictures: silhouettes lack them."""
         self._onlooker = Onlooker(body, self._cameras)
         self._problems = ProblemSource(session, body, self._cameras)

@@ -33,9 +33,8 @@ from studio.runs.tracks import (
     write_track,
 )
 from studio.search.trackers.clip_mending import mended_clip
-from studio.search.trackers.frame_refinement import descent
+from studio.search.trackers.frame_refinement import descent, followed_along_lines
 from studio.search.trackers.hidden_areas import without_hidden
-from studio.search.trackers.limb_resampling import chains_of
 from studio.search.trackers.loss_detection import Onlooker
 from studio.search.trackers.refinement import Distances, mm_at
 from studio.search.trackers.tracker import LIMB_LOST
@@ -108,7 +107,7 @@ def _corrected(
     settings = MaskSettings(run)
     evidence = partial(_look_at, problems, settings, read)
     refinement = settings.of(run.record.first).refinement
-    how, kept = descent(refinement), chains_of(problems.body) if refinement.thin_limbs else ()
+    how, kept = descent(refinement), followed_along_lines(problems.body, refinement)
     body, cameras, poses = problems.body, problems.cameras, dict(zip(track.frames, track.poses, strict=True))
     with run.results() as results:
 

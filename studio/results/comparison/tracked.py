@@ -39,8 +39,7 @@ from studio.search.likelihood.hard_priors import HardPriors
 from studio.search.settings import RunSettings, changed_settings, default_settings
 from studio.search.trackers.catalogue import TRACKERS
 from studio.search.trackers.clip_mending import mended_clip
-from studio.search.trackers.frame_refinement import FrameRefiner, descent
-from studio.search.trackers.limb_resampling import chains_of
+from studio.search.trackers.frame_refinement import FrameRefiner, descent, followed_along_lines
 from studio.search.trackers.refinement import Distances
 from studio.search.trackers.tracker import LayerRecord, start_of
 from studio.sessions.session import Session
@@ -240,10 +239,7 @@ def track_seeds(
                 return known_silhouettes(body, seen_with, evidence(frame), poses[row], run.memories[row])
 
             rows = np.array(frames)
-            how, kept = (
-                descent(settings.refinement),
-                chains_of(body) if settings.refinement.thin_limbs else (),
-            )
+            how, kept = descent(settings.refinement), followed_along_lines(body, settings.refinement)
             poses, _ = mended_clip(body, seen_with, rows, poses, lost, rate, silhouettes_of, how, kept=kept)
         figures = measured(session, body, poses, np.array(frames), evaluations, seconds / len(runs))
         by_frame = dict(zip(frames, lost, strict=True))

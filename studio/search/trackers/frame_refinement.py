@@ -30,6 +30,7 @@ from studio.search.trackers.limb_resampling import (
     SURELY_ALONG,
     Hypothesis,
     SeenFrame,
+    chains_of,
     drawn_along_lines,
     drawn_where_reported,
     recoloured,
@@ -114,6 +115,11 @@ def descent(
     return RefinementSettings(refinement_steps=steps, refinement_floor=settings.above_floor)
 
 
+def followed_along_lines(body: BodyModel, settings: FrameRefinementSettings) -> list[str]:
+    """The limbs that a run follows along lines in the pictures: silhouettes lack them."""
+    return chains_of(body) if settings.thin_limbs else []
+
+
 def space_after(space: SearchSpace, carried: FilterState, settings: FrameRefinementSettings) -> SearchSpace:
     """The search space of a frame that follows a refined one: a smaller σ0. carried : into the frame."""
     if not settings.refine_frames or carried.estimate is None or settings.refined_spread == 1.0:
@@ -185,7 +191,6 @@ class FrameRefiner:
         reported = frame.reported_by(source) if source is not None and is_due else {}
         if reported and settings.redraw_limbs:
             frame.redraw_where_reported(reported)
-
         if follows_lines:
             frame.redraw_along_lines(settings.redraw_limbs)
 
@@ -277,10 +282,8 @@ class _FrameInWork:
         if max(self.off.shares().values()) < DOUBTFUL_SHARE:
             return
         frame = self._seen(self.silhouettes)
-        began = frame.hypothesis(self.pose)
-        found, drawn = redrawn(self._rng(0), began, frame, self._result.carried.previous_estimate)
-        self.evaluations += drawn
-        self.pose, self.off = found.pose, found.off
+        began, last = self._hypothesis(frame), self._result.carried.previous_estimate
+        self._take(began, *redrawn(self._rng(0), began, frame, last))
 
     def look_at(self, changes: Mapping[str, Change]) -> None:
         """Take in what changed in the pictures, by camera."""
@@ -308,8 +311,7 @@ class _FrameInWork:
     def redraw_where_colours_deny(self, views: Sequence[ColouredView]) -> None:
         """Resample limbs where the pictures have not their colours."""
         colours, frame = self._tools.colours, self._seen(self.silhouettes)
-        loss = frame.refiner.loss_with_pull(self.pose, self.silhouettes)
-        began = Hypothesis(self.pose, loss, self.off)
+        began = self._hypothesis(frame)
         gains_of = functools.partial(colours.gains, views=views, known=colours.known(self._memory))
         self._take(began, *recoloured(self._rng(2), began, frame, self.elsewhere, gains_of))
 
@@ -338,13 +340,12 @@ class _FrameInWork:
             if not redraw:
                 continue
             frame = self._seen(self.silhouettes)
-            loss = frame.refiner.loss_with_pull(self.pose, self.silhouettes)
-            began, last = Hypothesis(self.pose, loss, self.off), self._result.carried.previous_estimate
+            began, last = self._hypothesis(frame), self._result.carried.previous_estimate
             rng = self._rng(4 + number)
             self._take(began, *drawn_along_lines(rng, began, frame, thin, lines, last))
             if (thin.support(self.pose, lines) or 0.0) < SURELY_ALONG:
-                began, lines_of = frame.hypothesis(self.pose), functools.partial(self._lines_of, thin)
-                if self._take(began, *turned_along_lines(rng, began, frame, thin, lines_of)):
+                began, lines_of = self._hypothesis(frame), functools.partial(self._lines_of, thin)
+                if self._take(began, *turned_along_lines(rng, began, frame, thin, lines, lines_of)):
                     self._lines[limb] = lines_of(self.pose)
 
     def _lines_of(self, thin: ThinLimb, pose: Array) -> list[Lines | None]:
@@ -362,6 +363,10 @@ class _FrameInWork:
         if self._ended.matrix is not None and self.pose is self._ended.pose:
             return self._ended.matrix
         return self._tools.refiner.loss(self.pose, self.silhouettes)[2]
+
+    def _hypothesis(self, frame: SeenFrame) -> Hypothesis:
+        """The pose as it stands. frame : of `silhouettes`."""
+        return Hypothesis(self.pose, frame.refiner.loss_with_pull(self.pose, self.silhouettes), self.off)
 
     def _take(self, began: Hypothesis, found: Hypothesis, drawn: int) -> bool:
         """Whether something was found, which is the pose then. drawn : poses compared."""

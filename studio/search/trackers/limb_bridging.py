@@ -27,7 +27,7 @@ from studio.foundations.progress import Progress, counting, no_progress
 from studio.search.trackers.agreement import limb_names
 from studio.search.trackers.clip_silhouettes import SilhouettesOf, rows_seen
 from studio.search.trackers.limb_resampling import bent_by
-from studio.search.trackers.refinement import RefinementSettings, Refiner
+from studio.search.trackers.refinement import RefinementSettings
 from studio.search.trackers.side_exchange import (
     MOST_SHARE,
     MOTION,
@@ -110,8 +110,7 @@ class _Work:
         self.tried: Callable[[], None] = lambda: None
         self._names = np.array(limb_names(body))
         self._seen = rows_seen(body, cameras, frames, silhouettes_of, settings)
-        refiner = Refiner(body, tuple(cameras), settings)
-        self._own = {limb: bent_by(refiner, limb) for limb in dict.fromkeys(self._names.tolist())}
+        self._own = {limb: bent_by(body, limb) for limb in dict.fromkeys(self._names.tolist())}
         self._kept = [angle for limb in kept for angle in self._own[limb]]
 
     def stretches(self, limb: str, lost: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -1,11 +1,11 @@
 """Limbs of a refined pose are resampled: over their whole range, where they are doubtful.
 
-Where the silhouettes show that a limb is off (`agreement`), that limb alone is drawn anew, half about its pose and half
-anywhere. The draws are ranked by their disagreement with the silhouettes beyond what clothes explain, not by weight: a
-limb folded into the trunk weighs more than one that is nearly right. The best are refined, and one is taken where the
-silhouettes agree with it clearly better. Where learnt colours (`limb_colours`) deny a limb, the draws are ranked by
-these, too; where a source beside the silhouettes reports a limb elsewhere (`reported_limbs`), those nearest to there
-are ranked.
+Where the silhouettes show that a limb is off (`agreement`), that limb alone is drawn again, half about its pose and
+half anywhere. The draws are ranked by their disagreement with the silhouettes beyond what clothes explain, not by
+weight: a limb folded into the trunk weighs more than one that is nearly right. The best are refined, and one is taken
+where the silhouettes agree with it clearly better. Where learnt colours (`limb_colours`) deny a limb, the draws are
+ranked by these, too; where a source beside the silhouettes reports a limb elsewhere (`reported_limbs`), those nearest
+to there are ranked. A thin limb is drawn along the lines in the pictures (`thin_limbs`).
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -158,7 +158,7 @@ def redrawn(
             break
         limb = max(doubtful, key=lambda name: (name in elsewhere, shares[name]))
         tried.add(limb)
-        own = bent_by(frame.refiner, limb)
+        own = bent_by(frame.refiner.body, limb)
         if limb in chains:
             drawn, weighed = drawn_along(rng, frame, found.pose, own)
             found = frame.best_of(found, drawn, own, BETTER_CHAIN)
@@ -192,7 +192,7 @@ def recoloured(
     """
     evaluations, chains = 0, chains_of(frame.refiner.body)
     for limb, one in elsewhere.items():
-        own, shows = bent_by(frame.refiner, limb), one.shown >= SURELY_SHOWN
+        own, shows = bent_by(frame.refiner.body, limb), one.shown >= SURELY_SHOWN
         if limb in chains or len(own) < FEWEST_ANGLES or (shows and not is_sure(one)):
             continue
         now = gains_of(found.pose[None], limb)
@@ -223,7 +223,7 @@ def drawn_where_reported(
     """
     evaluations, body = 0, frame.refiner.body
     for limb, one in reported.items():
-        own = bent_by(frame.refiner, limb)
+        own = bent_by(frame.refiner.body, limb)
         if len(own) < FEWEST_ANGLES:
             continue
         drawn = _drawn(rng, frame.refiner, found.pose[None], own, DENIED_DRAWS)
@@ -267,7 +267,6 @@ def drawn_along_lines(
             kept = np.array(_best_apart(drawn, -thin.gains(drawn, lines, number), bent, KEPT_ALONG_LINES))
         starts += list(kept)
     poses = np.array(starts)
-    gains = thin.gains(poses, lines)
     lower, upper = refiner.lower[own], refiner.upper[own]
     for spread in NARROWER:
         drawn = np.repeat(poses[:, None], CLIMBING_DRAWS, axis=1)
@@ -276,8 +275,8 @@ def drawn_along_lines(
         drawn[:, 0] = poses
         weighed += drawn.shape[0] * drawn.shape[1]
         weights = thin.gains(drawn.reshape(-1, drawn.shape[2]), lines).reshape(drawn.shape[:2])
-        rows, best = np.arange(len(poses)), weights.argmax(axis=1)
-        poses, gains = drawn[rows, best], weights[rows, best]
+        poses = drawn[np.arange(len(poses)), weights.argmax(axis=1)]
+    gains = thin.gains(poses, lines)
     most = float(thin.gains(found.pose[None], lines)[0]) + LEAST_LINES
     began_with = found
     for row in np.argsort(-gains, kind="stable")[:REFINED_DRAWS]:
@@ -294,23 +293,24 @@ def turned_along_lines(
     found: Hypothesis,
     frame: SeenFrame,
     thin: ThinLimb,
+    lines: Sequence[Lines | None],
     lines_of: Callable[[Array], Sequence[Lines | None]],
 ) -> tuple[Hypothesis, int]:
     """The hypothesis, or the body turned a little about the vertical with its thin limb along lines, if both these and
     the silhouettes say more for it; and the number of poses compared. A crouching animal is round, and its tail shows
-    where it points; of one that stands up no silhouette shows it, and the tail alone misleads. lines_of : of a pose
-    (D,).
+    where it points; of one that stands up no silhouette shows it, and the tail alone misleads. lines : around
+    the pose found. lines_of : around a pose (D,).
     """
     began_with, weighed = found, 0
-    most = float(thin.gains(found.pose[None], lines_of(found.pose))[0]) + LEAST_LINES
+    most = float(thin.gains(found.pose[None], lines)[0]) + LEAST_LINES
     for by in (TURNED, -TURNED):
         turned = turned_pose(frame.refiner.body, began_with.pose, by)
         if turned is None:
             break
         refined = frame.hypothesis(frame.refiner.refine(turned, frame.silhouettes).pose)
-        lines = lines_of(refined.pose)
-        other, drawn = drawn_along_lines(rng, refined, frame, thin, lines)
-        gain, weighed = float(thin.gains(other.pose[None], lines)[0]), weighed + drawn
+        around = lines_of(refined.pose)
+        other, drawn = drawn_along_lines(rng, refined, frame, thin, around)
+        gain, weighed = float(thin.gains(other.pose[None], around)[0]), weighed + drawn
         if gain > most and other.loss < BETTER_TURNED * began_with.loss:
             found, most = other, gain
     return found, weighed
@@ -338,7 +338,7 @@ def redraw_all(rng: np.random.Generator, found: Hypothesis, frame: SeenFrame) ->
     names = list(found.off.shares())
     twins = name_twins(names)
     for number, limb in enumerate(names):
-        own = bent_by(frame.refiner, limb)
+        own = bent_by(frame.refiner.body, limb)
         if len(own) < FEWEST_ANGLES:
             continue
         drawn = _drawn(rng, frame.refiner, found.pose[None], own)
@@ -350,26 +350,15 @@ def redraw_all(rng: np.random.Generator, found: Hypothesis, frame: SeenFrame) ->
 
 def chains_of(body: BodyModel) -> list[str]:
     """Limbs that are drawn joint by joint: those of more angles than are drawn at once, of a body with a tail."""
-    if not has_tail(body):
+    if not body.bounded_angles[root_parameters(body)].any():
         return []
-    limbs = [
-        entry.limb for entry, limited in zip(body.parameters, body.bounded_angles, strict=True) if limited
-    ]
-    return [limb for limb in dict.fromkeys(limbs) if limbs.count(limb) > MOST_TOGETHER]
+    limbs = dict.fromkeys(entry.limb for entry in body.parameters)
+    return [limb for limb in limbs if len(bent_by(body, limb)) > MOST_TOGETHER]
 
 
 def thin_limbs_of(body: BodyModel, cameras: Sequence[Camera], on_floor: bool) -> dict[str, ThinLimb]:
     """By name the limbs that may be found by lines in the pictures. on_floor : whether they stay above z = 0."""
-    return {
-        limb: ThinLimb(
-            body,
-            cameras,
-            limb,
-            [n for n, entry in enumerate(body.parameters) if entry.limb == limb and body.bounded_angles[n]],
-            on_floor,
-        )
-        for limb in chains_of(body)
-    }
+    return {limb: ThinLimb(body, cameras, limb, bent_by(body, limb), on_floor) for limb in chains_of(body)}
 
 
 def _doubts(off: Disagreement, chains: Sequence[str]) -> dict[str, float]:
@@ -400,7 +389,7 @@ def _both_redrawn(
     refiner, agreement = frame.refiner, frame.agreement
     names = list(found.off.shares())
     twin = names[int(name_twins(names)[names.index(limb)])]
-    own, others = bent_by(refiner, limb), bent_by(refiner, twin)
+    own, others = bent_by(refiner.body, limb), bent_by(refiner.body, twin)
     if twin == limb or len(own) < 2 or len(others) < 2:
         return found, 0
     places = _drawn(rng, refiner, found.pose[None], own)
@@ -409,9 +398,10 @@ def _both_redrawn(
     return frame.best_of(found, pairs, [*own, *others], share, most), len(places) + len(pairs)
 
 
-def bent_by(refiner: Refiner, limb: str) -> list[int]:
+def bent_by(body: BodyModel, limb: str) -> list[int]:
     """The angles with limits that bend a limb."""
-    return [n for n, entry in enumerate(refiner.body.parameters) if entry.limb == limb and refiner.bounded[n]]
+    bounded = body.bounded_angles
+    return [n for n, entry in enumerate(body.parameters) if entry.limb == limb and bounded[n]]
 
 
 def _drawn(
@@ -449,11 +439,7 @@ def has_tail(body: BodyModel) -> bool:
     """Whether a limb of the body is a chain of more angles than are drawn at once, and limits of its root keep the body
     off its back: silhouettes alone do not.
     """
-    bounded = body.bounded_angles
-    if not bounded[root_parameters(body)].any():
-        return False
-    limbs = [entry.limb for entry, limited in zip(body.parameters, bounded, strict=True) if limited]
-    return any(limbs.count(limb) > MOST_TOGETHER for limb in dict.fromkeys(limbs))
+    return bool(chains_of(body))
 
 
 def turned_pose(body: BodyModel, pose: Array, by: float = np.pi) -> Array | None:

@@ -36,16 +36,14 @@ HALF_PLAIN = 0.05
 """Mean log odds along a thin limb that is as likely lost as not."""
 LEAST_SEEN = 0.3
 """Share of a limb's points, of all views, that other limbs leave free, at least: hardly a tail is hidden from all."""
-
-
 NEVER = float(np.log(UNSEEN / (UNSEEN + NOTHING)))
 """The log odds without a line."""
 
 
 class Lines(NamedTuple):
     """What a view shows around a limb. odds : (DIRECTIONS, h, w) log odds for a limb of each direction, as of a line.
-    free : (h, w) where no other limb lies.
-    corner : its first pixel, x and y. lowest : mm, height of what is not under the floor.
+    free : (h, w) where no other limb lies. corner : its first pixel, x and y. lowest : mm, height of what is not under
+    the floor.
     """
 
     odds: Floats

@@ -44,7 +44,7 @@ def refiner(body: BodyModel) -> Refiner:
 
 def test_a_limb_is_bent_by_its_angles_with_limits(refiner: Refiner) -> None:
     for limb in ("left arm", "root", "right leg"):
-        own = limb_resampling.bent_by(refiner, limb)
+        own = limb_resampling.bent_by(refiner.body, limb)
         expected = [
             at
             for at, entry in enumerate(refiner.body.parameters)
@@ -55,7 +55,7 @@ def test_a_limb_is_bent_by_its_angles_with_limits(refiner: Refiner) -> None:
 
 def test_half_of_the_draws_lie_about_a_limbs_pose_and_half_anywhere_in_its_range(refiner: Refiner) -> None:
     """Of 100, 25 with a tenth of the range as deviation, 25 with three tenths, 50 evenly."""
-    own = limb_resampling.bent_by(refiner, "left arm")
+    own = limb_resampling.bent_by(refiner.body, "left arm")
     lower, upper = refiner.lower[own], refiner.upper[own]
     poses = np.stack([refiner.neutral, refiner.neutral + 0.1])
     found = limb_resampling._drawn(np.random.default_rng(0), refiner, poses, own, 100).reshape(2, 100, -1)
@@ -280,7 +280,7 @@ def tailed() -> Refiner:
 
 def test_a_chain_is_drawn_joint_by_joint_from_a_straight_one(tailed: Refiner) -> None:
     """One pose and 160 draws of it for the first joint; of six that are kept 160 each for every other."""
-    own, asked = limb_resampling.bent_by(tailed, "tail"), []
+    own, asked = limb_resampling.bent_by(tailed.body, "tail"), []
     pose = tailed.neutral + 0.05
     joints = limb_resampling._joints_of(tailed.body, own)
     frame = Told(tailed.body, tailed)
@@ -309,7 +309,7 @@ def test_a_chain_is_drawn_joint_by_joint_from_a_straight_one(tailed: Refiner) ->
 def test_a_body_is_turned_round_where_its_loss_is_clearly_lower(
     tailed: Refiner, loss: float, turned: bool
 ) -> None:
-    own = limb_resampling.bent_by(tailed, "tail")
+    own = limb_resampling.bent_by(tailed.body, "tail")
     found, other = (with_pose(hypothesis(value, tail=0.5), tailed.neutral) for value in (10.0, loss))
     frame = Told(tailed.body, tailed, {"tail": other})
     frame.hypothesis = lambda pose: with_pose(found, pose)

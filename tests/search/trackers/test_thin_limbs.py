@@ -196,7 +196,7 @@ def test_a_round_animal_is_turned_where_its_tail_and_the_silhouettes_say_more_fo
     monkeypatch.setattr(limb_resampling, "drawn_along_lines", lambda rng, found, *others: (found, 7))
     began = hypothesis(TRUTH)
     found, weighed = limb_resampling.turned_along_lines(
-        np.random.default_rng(0), began, frame, SimpleNamespace(gains=gain_of), lambda pose: []
+        np.random.default_rng(0), began, frame, SimpleNamespace(gains=gain_of), [], lambda pose: []
     )
     assert weighed == 14
     assert number_of(found.pose) == (0 if turned is None else turned + 1)
