@@ -212,12 +212,13 @@ def check_run(
             hidden: Mapping[str, Array] = results.result(frame).carried.memory if frame in known else {}
             off = _contradicted(agreement, pose, evidence, hidden)
             if off is not None:
-                elsewhere = dict[str, Elsewhere]()
+                elsewhere, changes = dict[str, Elsewhere](), changes_by_camera(evidence)
                 if witness.usable:
-                    elsewhere = witness.of(pose, tuple(changes_by_camera(evidence).values()), hidden)
+                    elsewhere = witness.of(pose, tuple(changes.values()), hidden)
                 pictures = {view.camera: view.picture for view in evidence.views}
                 reported = reported_lost(body, pose, reported_limbs(network, pose, pictures, elsewhere))
-                lines = lines_along(thin, pose, changes_by_camera(evidence), off.corners)
+                seen = {limb: one.lines(pose, changes, off.corners) for limb, one in thin.items()}
+                lines = lines_along(thin, pose, seen)
                 contradicted += [
                     ContradictedLimb(frame, limb, *found)
                     for limb, found in contradicted_limbs(off, elsewhere, reported, lines).items()

@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
 
+ROUNDS = 10
+"""Of the inversion of a lens."""
+
 
 def project(camera: Camera, points: Array) -> tuple[Array, Array]:
     """Pixels and depths of world points.
@@ -32,6 +35,18 @@ def nearest_pixels(camera: Camera, points: Array) -> tuple[Indices, NDArray[np.b
     near = np.rint(np.nan_to_num(pixels, nan=-1.0, posinf=-1.0, neginf=-1.0).clip(-1.0, 1e6)).astype(np.int64)
     fits = (near >= 0).all(axis=-1) & (near < (camera.width, camera.height)).all(axis=-1)
     return near, (depths > 0.0) & fits
+
+
+def directions(camera: Camera, pixels: Array) -> Array:
+    """(K, 3) directions through pixels (K, 2), in the camera's frame, of depth 1; the lens is inverted by fixed-point
+    iteration.
+    """
+    seen = np.linalg.solve(camera.matrix, np.column_stack([pixels, np.ones(len(pixels))]).T)[:2]
+    flat = seen.copy()
+    for _ in range(ROUNDS):
+        x, y, _ = distorted(flat[0], flat[1], camera.distortion)
+        flat += seen - np.stack([x, y])
+    return np.column_stack([*flat, np.ones(len(pixels))])
 
 
 def distorted(x: Any, y: Any, lens: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 - numbers or arrays

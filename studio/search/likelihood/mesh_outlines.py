@@ -13,7 +13,7 @@ from studio.body.model import BodyModel, moving_joint
 from studio.foundations.arrays import Array, Bytes, Indices, Mask
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.camera_table import camera_table, outward_limit
-from studio.foundations.geometry.projection import distorted, project
+from studio.foundations.geometry.projection import directions, project
 from studio.search.likelihood.mesh_kernels import draw_triangles, project_points
 
 MOST_POINTS = 3000
@@ -22,8 +22,6 @@ SMOOTHED = 1.5
 """Standard deviation, pixels, of the smoothing before an outline's direction is measured."""
 BEYOND = 4
 """Pixels around a silhouette that its smoothing reaches."""
-ROUNDS = 10
-"""In which a lens's distortion is taken from pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +117,7 @@ class MeshOutlines:
         x, y = border.astype(np.int64).T
         joint = self.joints[self.triangles[owner[y, x], 0]]
         away = depth[y, x].astype(np.float64)
-        world = (_rays(camera, border) * away[:, None] - camera.translation) @ camera.rotation
+        world = (directions(camera, border) * away[:, None] - camera.translation) @ camera.rotation
         own = np.einsum("kji,kj->ki", frames[joint][:, :, :3], world - frames[joint][:, :, 3])
         return MeshOutline(border, outward, joint, own)
 
@@ -206,13 +204,3 @@ def _closed_lines(inside: Mask) -> list[Array]:
                 line.append(line[0])
             lines.append(np.array(line, dtype=np.float64) + corner - 1.0)
     return lines
-
-
-def _rays(camera: Camera, pixels: Array) -> Array:
-    """(K, 3) directions through pixels (K, 2), in the camera's frame, of depth 1."""
-    seen = np.linalg.solve(camera.matrix, np.column_stack([pixels, np.ones(len(pixels))]).T)[:2]
-    flat = seen.copy()
-    for _ in range(ROUNDS):
-        x, y, _ = distorted(flat[0], flat[1], camera.distortion)
-        flat += seen - np.stack([x, y])
-    return np.column_stack([*flat, np.ones(len(pixels))])

@@ -13,12 +13,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, moving_joint
-from studio.body.scale import scale_of
 from studio.foundations.arrays import Array, Indices, Mask
 from studio.foundations.geometry.camera import Camera
-from studio.foundations.geometry.projection import project
 from studio.search.likelihood.outlines import OutlineProjector
 from studio.search.trackers.agreement_kernels import (
     FIELDS,
@@ -49,12 +46,11 @@ moved, goes from 33 to 72 and 58 mm (two seeds)."""
 @dataclass(frozen=True, slots=True, eq=False)
 class Disagreement:
     """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
-    than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb and within some limb's
-    reach, given to the nearest. limbs : (L,) name of the limb that each drawn one belongs to, from the body's
+    than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest
+    if that may lie there (`reach`). limbs : (L,) name of the limb that each drawn one belongs to, from the body's
     parameters. corners : (V, L, 4, 2) pixels of the pose's outlines. mm : (V,) size of a pixel at the body. covered :
     of a body with meshes, for a view and a number of pixels, whether a link lies on the middle of a cell of that size
-    (H, W). within : by limb of several parts, what is bare no farther from where it begins than it is long; empty where
-    hardly anything is bare.
+    (H, W). within : by limb of several parts, what is bare where the limb may lie; empty where hardly anything is bare.
     """
 
     area: Array
@@ -100,12 +96,10 @@ class Agreement:
         self._limbs = limb_names(body)
         self._projector = OutlineProjector.of_body(body, cameras)
         self._meshes = MeshAgreement(body, cameras) if body.meshes else None
-        scale, self._reaches = scale_of(body), dict[str, tuple[int, float]]()
-        """By limb of several parts the first of the drawn ones, and its length, mm at a person's size."""
-        for name in dict.fromkeys(self._limbs):
-            own = [number for number, limb in enumerate(self._limbs) if limb == name]
-            if len(own) > 1:
-                self._reaches[name] = own[0], sum(abs(body.drawn[number].length) for number in own) / scale
+        self._reach = reach_of(body, self._limbs)
+        self._groups = np.array([self._reach.limbs.index(limb) for limb in self._limbs])
+        self._of_parts = np.bincount(self._groups) > 1
+        """(G,) which limbs have several parts."""
 
     def corners(self, pose: Array) -> Array:
         """(V, L, 4, 2) pixels of the outlines of a pose (D,)."""
@@ -129,32 +123,23 @@ class Agreement:
                 view_counts(quads, view.signed, view.corner, view.size, step, reach, own)
         for own, step, mm in zip(counts, steps, sizes, strict=True):
             own *= (step * mm) ** 2
-        if (
-            counts[..., 2].sum(axis=0) > SOME_BARE * np.maximum(counts[..., 0].sum(axis=0), LEAST_AREA)
-        ).any():
+        area, uncovered = np.maximum(counts[..., 0].sum(axis=0), LEAST_AREA), counts[..., 2].sum(axis=0)
+        if self._reach.moves.any() and (uncovered > SOME_BARE * area).any():
             bare = bare or _bare_points(corners, silhouettes, steps, far)
-            points = [places for places, _ in bare]
-            away = reach_of(self.body).beyond(pose, self.cameras, silhouettes, points, sizes, FAR_MM)
-            for own, (_, limbs), beyond, step, mm in zip(counts, bare, away, steps, sizes, strict=True):
-                np.subtract.at(own[:, 2], limbs[beyond], (step * mm) ** 2)
-            reached = [own[~beyond] for own, beyond in zip(points, away, strict=True)]
-            within = self._within(pose, reached, steps, sizes)
+            there = self._reach.limbs_there(pose, self.cameras, silhouettes, [own for own, _ in bare], sizes)
+            areas = np.zeros(len(self._reach.limbs))
+            for own, (_, limbs), lie, step, mm in zip(counts, bare, there, steps, sizes, strict=True):
+                elsewhere = ~lie[np.arange(len(limbs)), self._groups[limbs]]
+                np.subtract.at(own[:, 2], limbs[elsewhere], (step * mm) ** 2)
+                areas += lie.sum(axis=0) * (step * mm) ** 2
+            within = {
+                limb: area
+                for limb, area, has in zip(self._reach.limbs, areas.tolist(), self._of_parts, strict=True)
+                if has
+            }
         return Disagreement(
             counts[..., 0], counts[..., 1], counts[..., 2], self._limbs, corners, sizes, covered, within
         )
-
-    def _within(
-        self, pose: Array, bare: Sequence[Array], steps: Sequence[int], sizes: Sequence[float]
-    ) -> dict[str, float]:
-        """mm² of the bare points of each view (K, 2) within the length of limbs of several parts from their roots."""
-        roots = limb_ends(self.body, pose[None])[0, :, 0]
-        found = dict.fromkeys(self._reaches, 0.0)
-        for camera, points, step, mm in zip(self.cameras, bare, steps, sizes, strict=True):
-            places = project(camera, roots)[0]
-            for limb, (first, length) in self._reaches.items():
-                away = np.linalg.norm(points - places[first], axis=1)
-                found[limb] += float(np.count_nonzero(away * mm <= length)) * (step * mm) ** 2
-        return found
 
     def of_places(self, poses: Array, silhouettes: Sequence[Distances], without: str | None = None) -> Array:
         """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a

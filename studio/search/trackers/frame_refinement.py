@@ -53,7 +53,7 @@ from studio.search.trackers.reported_limbs import (
     reported_limbs,
     reported_lost,
 )
-from studio.search.trackers.thin_limbs import Lines, ThinLimb
+from studio.search.trackers.thin_limbs import Lines, ThinLimb, lines_along
 from studio.search.trackers.tracker import FilterState, FrameLikelihood, FrameResult, SearchSpace
 
 POSE, CLOUD = "pose", "cloud"
@@ -353,10 +353,7 @@ class _FrameInWork:
 
     def along_lines(self) -> dict[str, float]:
         """By thin limb how plainly lines run along it, where they are seen."""
-        found = {
-            limb: self._tools.thin[limb].support(self.pose, lines) for limb, lines in self._lines.items()
-        }
-        return {limb: one for limb, one in found.items() if one is not None}
+        return lines_along(self._tools.thin, self.pose, self._lines)
 
     def normal_matrix(self) -> Array:
         """(D, D) of the least squares at the pose."""

@@ -21,7 +21,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, Limb
 from studio.body.scale import scale_of
 from studio.evidence.cells import cell_size
@@ -43,6 +42,7 @@ from studio.search.trackers.limb_places import (
     places_left_bare,
     squares_of,
 )
+from studio.search.trackers.reach import numbers_of, reach_of
 from studio.search.trackers.tracker import HIDDEN
 
 SPACING = 35.0
@@ -74,8 +74,6 @@ MOSTLY_EXPLAINED = 0.8
 cameras moved, are no longer named."""
 AROUND_MM, MOST_PLACES = 45.0, 4096
 """mm at a person's size, up to which what changed beside a place is a limb's that is elsewhere; the most places."""
-REACH = 1.05
-"""Times a limb's length: how far from its root it may end."""
 WIDER = 1.2
 """Times a block's radius in pixels, for a lens that distorts."""
 
@@ -141,13 +139,11 @@ class LimbsElsewhere:
         self._limbs = tuple(dict.fromkeys(names))
         self._owners = np.array([self._limbs.index(name) for name in names])
         self._bending = tuple(limb for limb in self._limbs if names.count(limb) > 1)
-        self._roots = np.array([names.index(limb) for limb in self._limbs])
-        lengths, volumes = np.array([(abs(limb.length), _volume(limb)) for limb in body.drawn]).T
         own = np.arange(len(self._limbs))[:, None] == self._owners
-        bends = np.array([limb in self._bending for limb in self._limbs])
-        self._reaches, self._volumes = np.where(bends, REACH * (own @ lengths), 0.0), own @ volumes
-        self._views = np.array([_numbers(camera) for camera in cameras])
-        self.usable = len(cameras) >= LEAST_VIEWS and bool(self._bending)
+        self._volumes = own @ np.array([_volume(limb) for limb in body.drawn])
+        self._reach, self._views = reach_of(body, names), np.array([numbers_of(camera) for camera in cameras])
+        self._free = self._reach.moves & np.array([limb in self._bending for limb in self._limbs])
+        self.usable = len(cameras) >= LEAST_VIEWS and bool(self._free.any())
 
     def of(
         self, pose: Array, changed: Sequence[Change], memory: Mapping[str, Array] | None = None
@@ -155,7 +151,7 @@ class LimbsElsewhere:
         """By limb with a joint of its own, as named in the body's parameters. pose : (D,). changed : one a camera.
         memory : of the frame's start, with known occlusions.
         """
-        bare, own, _ = self._look(pose, changed, memory, self._reaches)
+        bare, own, _ = self._look(pose, changed, memory, self._bending)
         spacing = SPACING * self._scale
         found = dict[str, Elsewhere]()
         for limb in self._bending:
@@ -178,8 +174,7 @@ class LimbsElsewhere:
         """By camera pixels (K, 2), and up to how many pixels from them the pictures show some limbs of a pose that are
         elsewhere. Others : as of `of`.
         """
-        reaches = np.where([limb in limbs for limb in self._limbs], self._reaches, 0.0)
-        _, _, places = self._look(pose, changed, memory, reaches, MOST_PLACES)
+        _, _, places = self._look(pose, changed, memory, limbs, MOST_PLACES)
         sizes = self._agreement.mm_per_pixel(pose)
         return {
             camera.name: (_pixels(camera, places), AROUND_MM / mm)
@@ -191,19 +186,21 @@ class LimbsElsewhere:
         pose: Array,
         changed: Sequence[Change],
         memory: Mapping[str, Array] | None,
-        reaches: Array,
+        limbs: Collection[str],
         most: int = 0,
     ) -> tuple[NDArray[np.int64], Array, Array]:
         """(G,) how many places within a limb's reach changed and are left bare; (3, G) mm² in which each limb lies,
-        alone, and of these what changed; (K, 3) the first `most` of the places. reaches : (G,) mm, 0 for limbs that are
-        not looked for.
+        alone, and of these what changed; (K, 3) the first `most` of the places. limbs : that are looked for.
         """
         corners, sizes = self._agreement.corners(pose), self._agreement.mm_per_pixel(pose)
-        ends = limb_ends(self._body, pose[None])[0]
+        free = self._free & np.array([limb in limbs for limb in self._limbs])
+        frames, halves, cubes = self._reach.placed(pose)
+        halves = np.where(free, halves, 0.0)
+        centres, reaches = frames[:, :, 3], np.sqrt(3.0) * halves
         maps, begin = np.zeros((len(changed), 4), np.int64), 0
         kinds, near, own = list[Bytes](), list[Bytes](), np.zeros((3, len(self._limbs)))
         rough, begins = list[Bytes](), np.zeros((len(changed), 2), np.int64)
-        roots, spacing = ends[self._roots, 0], SPACING * self._scale
+        spacing = SPACING * self._scale
         radius = 0.5 * np.sqrt(3.0) * (BLOCK - 1) * spacing
         for number, (camera, view, mm) in enumerate(zip(self._cameras, changed, sizes, strict=True)):
             seen = _with_hidden(view.kinds, view.size, camera, memory)
@@ -213,14 +210,13 @@ class LimbsElsewhere:
             own += counts
             kinds.append(seen.ravel())
             near.append(beside.ravel())
-            nearest = (roots @ camera.rotation[2] + camera.translation[2] - reaches).min() - radius
+            nearest = (centres @ camera.rotation[2] + camera.translation[2] - reaches)[free].min() - radius
             wide = WIDER * float(camera.matrix[0, 0]) * radius / max(nearest, radius) / view.size
             squares = _squares_around(seen, wide)
             begins[number] = sum(map(len, rough)), squares.shape[1]
             rough.append(squares.ravel())
-        free = reaches > 0.0
-        low = (roots - reaches[:, None])[free].min(axis=0)
-        high = (roots + reaches[:, None])[free].max(axis=0)
+        low = (centres - reaches[:, None])[free].min(axis=0)
+        high = (centres + reaches[:, None])[free].max(axis=0)
         low[2] = max(low[2], ABOVE_FLOOR * self._scale)
         steps = np.maximum(np.ceil((high - low) / (spacing * BLOCK)), 1.0).astype(np.int64)
         places = np.zeros((most, 3))
@@ -231,8 +227,9 @@ class LimbsElsewhere:
             begins,
             maps,
             self._views,
-            roots,
-            reaches,
+            frames,
+            halves,
+            cubes,
             low,
             steps,
             spacing,
@@ -298,12 +295,6 @@ def _volume(limb: Limb) -> float:
     """mm³ of a truncated cone."""
     one, other = limb.radius_start, limb.radius_end
     return float(np.pi * abs(limb.length) * (one**2 + one * other + other**2) / 3.0)
-
-
-def _numbers(camera: Camera) -> Array:
-    """(23,) as of `cell_at`."""
-    parts = camera.matrix[:2].ravel(), camera.distortion, camera.rotation.ravel(), camera.translation
-    return np.concatenate(parts)
 
 
 def _pixels(camera: Camera, places: Array) -> Indices:

@@ -134,11 +134,13 @@ class ThinLimb:
 
 
 def lines_along(
-    limbs: Mapping[str, ThinLimb], pose: Array, changes: Mapping[str, Change], corners: Array
+    limbs: Mapping[str, ThinLimb], pose: Array, lines: Mapping[str, Sequence[Lines | None]]
 ) -> dict[str, float]:
-    """By thin limb of a pose (D,) how plainly lines run along it. Others : as of `ThinLimb.lines`."""
-    found = {limb: one.support(pose, one.lines(pose, changes, corners)) for limb, one in limbs.items()}
-    return {limb: odds for limb, odds in found.items() if odds is not None}
+    """By thin limb of a pose (D,) how plainly lines run along it, where they are seen. lines : by limb, as of
+    `ThinLimb.lines`.
+    """
+    found = {limb: limbs[limb].support(pose, own) for limb, own in lines.items()}
+    return {limb: plain for limb, plain in found.items() if plain is not None}
 
 
 def _odds_along(camera: Camera, view: Lines, ends: Array, points: Array) -> tuple[Array, Array]:

@@ -2,13 +2,16 @@
 
 import dataclasses
 
+import cv2
 import numpy as np
 import pytest
 from drawn_people import drawn_evidence, ring_of_cameras
 from moving_bodies import standing
 
+from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouette_distances
+from studio.foundations.geometry.projection import project
 from studio.search.trackers.agreement import Agreement, limb_names, without_bare
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 
@@ -91,3 +94,19 @@ def test_what_lies_bare_beside_the_trunk_is_in_an_arms_reach(body: BodyModel) ->
     smeared = dataclasses.replace(found, bare=0.021 * found.area.sum() / whole * found.bare)
     assert smeared.shares_in_reach() == smeared.shares()
     assert not without_bare(found).within
+
+
+def test_a_lump_that_one_view_alone_shows_is_no_limbs(body: BodyModel) -> None:
+    """Above a shoulder, within the arm's reach; in all views it would be the arm's."""
+    truth = place(body)
+    agreement = Agreement(body, ring_of_cameras(3, 480, 360))
+    shoulder = limb_ends(body, truth[None])[0, [limb.name for limb in body.drawn].index("left upper arm"), 0]
+    beside = shoulder + np.array([0.0, 330.0, 130.0])
+    for views, is_named in ((1, False), (3, True)):
+        evidence = drawn_evidence(body, truth, agreement.cameras)
+        for view in evidence.views[:views]:
+            camera = next(one for one in agreement.cameras if one.name == view.camera)
+            at = np.round(project(camera, beside)[0]).astype(int)
+            cv2.circle(view.mask, tuple(at.tolist()), 12, 255, -1)
+        found = agreement.of(truth, silhouette_distances(evidence)).shares()
+        assert (found["left arm"] > LIMB_LOST_SHARE) == is_named

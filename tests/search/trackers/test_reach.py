@@ -11,14 +11,14 @@ from looking_cameras import turned_to
 
 from studio.body.catalogue import load_body
 from studio.body.definition import BodyDefinition, JointEntry, LimbEntry, ParameterEntry, StepEntry
-from studio.body.forward_kinematics import joint_frames
+from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.model import BodyModel
 from studio.body.reader import assemble, check_definition
 from studio.evidence.distance_maps import SilhouetteDistances, distances_of
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
-from studio.search.trackers.agreement import Agreement
-from studio.search.trackers.reach import Reach
+from studio.search.trackers.agreement import Agreement, limb_names
+from studio.search.trackers.reach import Reach, is_reached
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 
 Array = np.ndarray
@@ -76,56 +76,76 @@ def everywhere(camera: Camera) -> SilhouetteDistances:
     return distances_of(np.full((camera.height, camera.width), 255, np.uint8), 10)
 
 
+def lies_there(
+    body: BodyModel, pose: Array, cameras: list[Camera], silhouettes: list, pixels: Array
+) -> Array:
+    """(K, G) of the first camera's pixels, at 10 mm a pixel, which limbs may lie there."""
+    nothing = [np.zeros((0, 2))] * (len(cameras) - 1)
+    reach = Reach(body, limb_names(body))
+    return reach.limbs_there(pose, cameras, silhouettes, [pixels, *nothing], [10.0] * len(cameras))[0]
+
+
 @pytest.mark.parametrize("aside", [0.0, 300.0])
 def test_a_pole_reaches_a_sector_about_its_hinge(aside: float) -> None:
-    """Whoever moves the root moves what is reached. Cubes of 100 mm, a radius of 40 mm and 45 mm of clothes blur it."""
+    """Whoever moves the root moves what is reached; the column, which is the root's, reaches what the pole does. Cubes
+    of 70 mm and the pole's radius of 40 mm blur it.
+    """
     camera, around = facing(np.array([0.0, -4000.0, 1000.0])), np.radians(np.arange(-180, 180, 15))
-    reach, pose = Reach(swinging()), np.array([aside, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3])
+    pose = np.array([aside, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3])
     for distance in (400.0, 700.0, 1100.0, 1400.0):
         points = np.array([aside, 0.0, 1000.0]) + distance * np.stack(
             [np.sin(around), 0.0 * around, np.cos(around)], axis=1
         )
         pixels = project(camera, points)[0]
-        (beyond,) = reach.beyond(pose, (camera,), (everywhere(camera),), (pixels,), (10.0,), 45.0)
+        column, pole = lies_there(swinging(), pose, [camera], [everywhere(camera)], pixels).T
+        assert (column == pole).all()
         off = np.abs(np.degrees(around))
         apart = distance * np.sin(np.radians(np.clip(off - 60.0, 0.0, 90.0)))
+        assert not pole[apart > 200.0].any()
         if distance < 800.0:
-            assert not beyond[off <= 60.0].any()
-            assert beyond[apart > 300.0].all()
+            assert pole[off <= 60.0].all()
         else:
-            assert beyond.all() == (distance > 1050.0)
-            assert beyond[apart > 300.0].all()
+            assert not pole.any() or distance < 1000.0
 
 
-def test_a_place_counts_that_half_of_the_other_views_show() -> None:
-    """The pole's own way up, seen from the front; two others look along x and y, and their masks have it or not."""
-    body = swinging()
-    cameras = tuple(
-        facing(np.array(centre))
-        for centre in ([0.0, -4000.0, 1000.0], [4000.0, 0.0, 1000.0], [0.0, 4000.0, 1000.0])
-    )
+@pytest.mark.parametrize(
+    ("shown", "is_there"),
+    [
+        ((True, True, True), True),
+        ((True, True, False), True),
+        ((True, False, False), False),
+        ((True, True), True),
+        ((True, False), False),
+    ],
+)
+def test_a_place_counts_that_two_of_three_other_views_show(shown: tuple[bool, ...], is_there: bool) -> None:
+    """The pole's own way up, seen from the front; the others look along x and y, and their masks have it or not."""
+    places = [[0.0, -4000.0, 1000.0], [4000.0, 0.0, 1000.0], [0.0, 4000.0, 1000.0], [-4000.0, 0.0, 1000.0]]
+    cameras = [facing(np.array(centre)) for centre in places[: 1 + len(shown)]]
     pixels = project(cameras[0], np.array([[0.0, 0.0, 1600.0]]))[0]
-    nothing = np.zeros((0, 2))
-    for shown, said in (((True, True), False), ((True, False), False), ((False, False), True)):
-        silhouettes = [everywhere(cameras[0])]
-        for camera, whole in zip(cameras[1:], shown, strict=True):
-            mask = np.full((camera.height, camera.width), 255 if whole else 0, np.uint8)
-            # Below the hinge there is something in any case.
-            mask[-60:] = 255
-            silhouettes.append(distances_of(mask, 10))
-        beyond = Reach(body).beyond(
-            np.zeros(7), cameras, silhouettes, (pixels, nothing, nothing), (10.0,) * 3, 45.0
-        )
-        assert beyond[0].tolist() == [said]
-        assert [len(own) for own in beyond] == [1, 0, 0]
+    silhouettes = [everywhere(cameras[0])]
+    for camera, whole in zip(cameras[1:], shown, strict=True):
+        mask = np.full((camera.height, camera.width), 255 if whole else 0, np.uint8)
+        # Below the hinge there is something in any case.
+        mask[-60:] = 255
+        silhouettes.append(distances_of(mask, 10))
+    found = lies_there(swinging(), np.zeros(7), cameras, silhouettes, pixels)
+    assert (found == is_there).all()
 
 
-def test_of_a_body_that_cannot_bend_nothing_is_beyond() -> None:
+def test_a_view_without_any_silhouette_denies_nothing() -> None:
+    """A camera that failed."""
+    cameras = [facing(np.array(centre)) for centre in ([0.0, -4000.0, 1000.0], [4000.0, 0.0, 1000.0])]
+    pixels = project(cameras[0], np.array([[0.0, 0.0, 1600.0]]))[0]
+    empty = distances_of(np.zeros((cameras[1].height, cameras[1].width), np.uint8), 10)
+    assert lies_there(swinging(), np.zeros(7), cameras, [everywhere(cameras[0]), empty], pixels).all()
+
+
+def test_of_a_body_that_cannot_bend_all_that_is_bare_counts() -> None:
     stick = standing_body("stick", (None, COLUMN))
-    camera = facing(np.array([0.0, -4000.0, 1000.0]))
-    pixels = np.array([[1.0, 1.0], [470.0, 350.0]])
-    (beyond,) = Reach(stick).beyond(np.zeros(6), (camera,), (everywhere(camera),), (pixels,), (10.0,), 45.0)
-    assert not beyond.any()
+    cameras = tuple(facing(np.array(centre)) for centre in ([0.0, -4000.0, 1000.0], [4000.0, 0.0, 1000.0]))
+    shown = Agreement(stick, cameras).of(np.zeros(6), [everywhere(camera) for camera in cameras])
+    assert shown.bare.sum() > shown.area.sum()
 
 
 def seen_with_forearm(pose: Array, length: float) -> list[SilhouetteDistances]:
@@ -165,3 +185,24 @@ def test_beside_a_forearm_a_finger_that_is_elsewhere_is_found() -> None:
     index = np.array(found.limbs) == "index"
     assert found.bare[:, index].sum() == alone.bare[:, index].sum() > 0.0
     assert found.shares()["index"] > LIMB_LOST_SHARE
+
+
+def test_a_haunch_reaches_the_floor_and_not_over_the_back() -> None:
+    """Above the haunch, nearer than it is long, an arched back is bare."""
+    mouse = load_body("mouse31")
+    reach = Reach(mouse, limb_names(mouse))
+    haunch, pose = reach.limbs.index("left haunch"), mouse.neutral
+    hip, knee = limb_ends(mouse, pose)[0, [limb.name for limb in mouse.drawn].index("left haunch")]
+    length = 36.0  # of haunch and foot, mm
+
+    def reaches(place: Array) -> bool:
+        return bool(is_reached(*reach.placed(pose), haunch, *place))
+
+    assert reaches(hip)
+    assert reaches(knee)
+    assert reaches(hip - np.array([0.0, 0.0, 0.8 * length]))
+    assert not reaches(hip + np.array([0.0, 0.0, 0.8 * length]))
+    # Whoever turns the body turns what is reached.
+    turned = pose.copy()
+    turned[[entry.name for entry in mouse.parameters].index("pitch")] = np.pi
+    assert is_reached(*reach.placed(turned), haunch, *(hip + np.array([0.0, 0.0, 0.8 * length])))

@@ -1,6 +1,7 @@
 """A tail that masks lack is found by the lines in the pictures."""
 
 import dataclasses
+from collections.abc import Mapping
 from functools import partial
 from types import SimpleNamespace
 
@@ -25,7 +26,7 @@ from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
 from studio.search.trackers.limb_resampling import Hypothesis, chains_of, thin_limbs_of
 from studio.search.trackers.limbs_elsewhere import Change, changes_by_camera
-from studio.search.trackers.thin_limbs import HALF_PLAIN, lines_along
+from studio.search.trackers.thin_limbs import HALF_PLAIN, ThinLimb, lines_along
 from studio.search.trackers.tracker import Estimate, FrameResult, start_of
 
 MOUSE = load_body("mouse31")
@@ -71,8 +72,14 @@ def refined(evidence: FrameEvidence, **knobs: bool) -> FrameResult:
 
 
 def along(pose: Array, evidence: FrameEvidence) -> dict[str, float]:
-    corners = Agreement(MOUSE, SMALL).corners(pose)
-    return lines_along(ON_FLOOR, pose, changes_by_camera(evidence), corners)
+    return along_in(ON_FLOOR, pose, changes_by_camera(evidence), Agreement(MOUSE, SMALL).corners(pose))
+
+
+def along_in(
+    thin: Mapping[str, ThinLimb], pose: Array, changes: Mapping[str, Change], corners: Array
+) -> dict[str, float]:
+    """How plainly lines run along limbs, seen around outlines (V, L, 4, 2)."""
+    return lines_along(thin, pose, {limb: one.lines(pose, changes, corners) for limb, one in thin.items()})
 
 
 def test_a_tail_is_found_that_no_mask_shows() -> None:
@@ -100,7 +107,7 @@ def test_nothing_is_said_without_an_empty_view_and_a_tail_hidden_from_all_is_los
     assert along(TRUTH, seen(empty=False)) == {}
     everywhere = np.stack([[[0.0, 0.0], [640.0, 0.0], [640.0, 480.0], [0.0, 480.0]]] * len(MOUSE.drawn))
     changes = changes_by_camera(seen())
-    assert lines_along(ON_FLOOR, TRUTH, changes, np.stack([everywhere] * len(SMALL))) == {"tail": 0.0}
+    assert along_in(ON_FLOOR, TRUTH, changes, np.stack([everywhere] * len(SMALL))) == {"tail": 0.0}
 
 
 def test_a_tail_under_the_floor_shows_nowhere() -> None:
@@ -110,7 +117,7 @@ def test_a_tail_under_the_floor_shows_nowhere() -> None:
     flying = thin_limbs_of(MOUSE, SMALL, on_floor=False)
     lowest = marker_points(MOUSE, below[None])[0, TIP, 2]
     assert lowest < -10.0
-    on_floor, free = (lines_along(thin, below, changes, corners)["tail"] for thin in (ON_FLOOR, flying))
+    on_floor, free = (along_in(thin, below, changes, corners)["tail"] for thin in (ON_FLOOR, flying))
     assert on_floor < 0.0 < free
 
 
@@ -132,7 +139,7 @@ def test_pictures_of_another_size_than_the_empty_one_say_nothing() -> None:
         for name, one in changes_by_camera(seen()).items()
     }
     corners = Agreement(MOUSE, SMALL).corners(TRUTH)
-    assert lines_along(ON_FLOOR, TRUTH, changes, corners) == {}
+    assert along_in(ON_FLOOR, TRUTH, changes, corners) == {}
 
 
 def test_a_check_asks_the_lines_alone_of_a_tail() -> None:
