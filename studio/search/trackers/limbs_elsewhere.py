@@ -2,9 +2,9 @@
 
 The silhouettes cannot witness against a limb that they lack, as where the shadow test has taken bare arms for the
 floor's shadow. What differs from the background at all, shadows too, still has them. A grid of points is projected into
-all views: a point within a limb's reach that lies on changed cells in every view that sees it, and in two views or more
-far from all limbs of the pose, is something that the pose does not explain. A shadow on the floor is none: only points
-well above the floor count. Of the limbs in whose reach such points lie those are elsewhere whose own
+all views: a point where a limb can be (`reach`), and that lies on changed cells in every view that sees it, and in two
+views or more far from all limbs of the pose, is something that the pose does not explain. A shadow on the floor is
+none: only points well above the floor count. Of the limbs that can be at such points those are elsewhere whose own
 projection explains little: a limb that is where it seems covers changed cells that no other limb covers, and a lost one
 lies outside them, or on other limbs.
 
