@@ -47,11 +47,11 @@ moved, goes from 33 to 72 and 58 mm (two seeds)."""
 class Disagreement:
     """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
     than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest
-    if that may lie there (`reach`), and never to the root's. limbs : (L,) name of the limb that each drawn one belongs
-    to, from the body's parameters. corners : (V, L, 4, 2) pixels of the pose's outlines. mm : (V,) size of a pixel at
-    the body. covered : of a body with meshes, for a view and a number of pixels, whether a link lies on the middle of a
-    cell of that size (H, W). within : by limb of several parts, what is bare where the limb may lie; empty where hardly
-    anything is bare.
+    if that may lie there (`reach`), of the root's if any limb may. limbs : (L,) name of the limb that each drawn one
+    belongs to, from the body's parameters. corners : (V, L, 4, 2) pixels of the pose's outlines. mm : (V,) size of a
+    pixel at the body. covered : of a body with meshes, for a view and a number of pixels, whether a link lies on the
+    middle of a cell of that size (H, W). within : by limb of several parts, what is bare where the limb may lie; empty
+    where hardly anything is bare.
     """
 
     area: Array
@@ -129,36 +129,28 @@ class Agreement:
             bare = bare or _bare_points(corners, silhouettes, steps, far)
             cells = [(step * mm) ** 2 for step, mm in zip(steps, sizes, strict=True)]
             there = self._reach.limbs_there(pose, self.cameras, silhouettes, [own for own, _ in bare], sizes)
-            within = self._give_to_limbs(bare, there, corners, cells, counts)
+            within = self._take_away(bare, there, cells, counts)
         return Disagreement(
             counts[..., 0], counts[..., 1], counts[..., 2], self._limbs, corners, sizes, covered, within
         )
 
-    def _give_to_limbs(
+    def _take_away(
         self,
         bare: Sequence[tuple[Array, Indices]],
         there: Sequence[Mask],
-        corners: Array,
         cells: Sequence[float],
         counts: Array,
     ) -> dict[str, float]:
-        """Give what is bare, the last column of counts (V, L, 3), to the nearest limb if that may lie there; what is
-        nearest to the root's, which stays where it is, to the nearest of the others that may.
+        """Take what is bare where the nearest limb cannot lie from the last column of counts (V, L, 3).
 
-        bare : of each view pixels (K, 2) and the nearest limbs (K,). there : (K, G) which limbs may lie there. corners
-        : (V, L, 4, 2). cells : mm² of a pixel of each view. Returns by limb of several parts what is bare where it may
-        lie, mm².
+        bare : of each view pixels (K, 2) and the nearest limbs (K,). there : (K, G) which limbs may lie there. cells :
+        mm² of a pixel of each view. Returns by limb of several parts what is bare where it may lie, mm².
         """
         within = np.zeros(len(self._reach.limbs))
-        for (points, nearest), allowed, quads, cell, own in zip(
-            bare, there, corners, cells, counts, strict=True
-        ):
+        for (_, nearest), allowed, cell, own in zip(bare, there, cells, counts, strict=True):
+            elsewhere = ~allowed[np.arange(len(nearest)), self._groups[nearest]]
+            np.subtract.at(own[:, 2], nearest[elsewhere], cell)
             within += allowed.sum(axis=0) * cell
-            groups = self._groups[nearest]
-            limbs = np.where(allowed[np.arange(len(points)), groups], nearest, -1)
-            of_root = ~self._reach.moves[groups]
-            limbs[of_root] = nearest_limbs(points[of_root], quads, allowed[of_root], self._groups)
-            own[:, 2] = np.bincount(limbs[limbs >= 0], minlength=len(own)) * cell
         of_limbs = zip(self._reach.limbs, within.tolist(), self._of_parts, strict=True)
         return {limb: area for limb, area, has_parts in of_limbs if has_parts}
 
@@ -199,9 +191,7 @@ def _bare_points(
     found = list[tuple[Array, Indices]]()
     for quads, view, step, reach in zip(corners, silhouettes, steps, far, strict=True):
         points = far_points(quads, view.signed, view.corner, step, reach)
-        limbs = nearest_limbs(
-            points, quads, np.ones((len(points), 1), np.bool_), np.zeros(len(quads), np.int64)
-        )
+        limbs = nearest_limbs(points, quads)
         found.append((points[limbs >= 0], limbs[limbs >= 0]))
     return found
 

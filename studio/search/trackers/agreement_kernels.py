@@ -131,9 +131,9 @@ def far_points(
 
 
 @njit(**EXACT)
-def nearest_limbs(points: Array, quads: Array, allowed: Mask, groups: Indices) -> Indices:
-    """(K,) the limb of quads (L, 4, 2) that is nearest to each point (K, 2), of those whose group is allowed there
-    (K, G), the first of those that are as near; -1 where none is seen. groups : (L,).
+def nearest_limbs(points: Array, quads: Array) -> Indices:
+    """(K,) the limb of quads (L, 4, 2) that is nearest to each point (K, 2), the first of those that are as near; -1
+    where none is seen.
     """
     turns, found = np.zeros(quads.shape[0]), np.full(points.shape[0], -1, np.int64)
     for limb in range(quads.shape[0]):
@@ -141,7 +141,7 @@ def nearest_limbs(points: Array, quads: Array, allowed: Mask, groups: Indices) -
     for k in range(points.shape[0]):
         nearest = np.inf
         for limb in range(quads.shape[0]):
-            if not np.isfinite(quads[limb, 0, 0]) or not allowed[k, groups[limb]]:
+            if not np.isfinite(quads[limb, 0, 0]):
                 continue
             distance = distance_to(points[k, 0], points[k, 1], quads[limb], turns[limb])
             if distance < nearest:

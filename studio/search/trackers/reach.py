@@ -104,7 +104,8 @@ class Reach:
         pixels: Sequence[Array],
         mm: Sequence[float],
     ) -> list[NDArray[np.bool_]]:
-        """(K, G) of each view's pixels (K, 2) which limbs may lie there, none that cannot move.
+        """(K, G) of each view's pixels (K, 2) which limbs may lie there; of a limb that cannot move whether any other
+        may.
 
         pose : (D,). silhouettes : one a camera. mm : size of a pixel at the body, by view, at a person's size.
         """
@@ -125,6 +126,7 @@ class Reach:
             fill_limbs_there(
                 signed, corners, maps, views, near, view, eye, rays, *placed, step, LEAST_AGREEING, there
             )
+            there[:, ~self.moves] = np.any(there, axis=1, keepdims=True)
             found.append(there)
         return found
 

@@ -76,22 +76,19 @@ def test_an_empty_view_leaves_every_limb_outside(body: BodyModel) -> None:
 
 
 def test_what_lies_bare_beside_the_trunk_is_in_an_arms_reach(body: BodyModel) -> None:
-    """An arm that hangs, and is thought to be folded: most of what it leaves bare is nearer to the trunk, which is the
-    root's and cannot lie there, and to a leg.
-    """
+    """An arm that hangs, and is thought to be folded: most of what it leaves bare is nearer to the trunk."""
     truth, folded = (standing(body, right_shoulder_rx=0.1, right_elbow_ry=bend) for bend in (0.0, -2.2))
     agreement = Agreement(body, ring_of_cameras(3, 480, 360))
     found = agreement.of(folded, silhouette_distances(drawn_evidence(body, truth, agreement.cameras)))
     own = np.array(found.limbs) == "right arm"
     whole, area = found.bare.sum(), found.area[:, own].sum()
-    assert 0.5 * whole < found.bare[:, own].sum() < 0.7 * whole
-    assert not found.bare[:, np.array(found.limbs) == "root"].any()
+    assert found.bare[:, own].sum() < 0.3 * whole
     assert found.within["right arm"] > 0.9 * whole
     assert "root" not in found.within
     in_reach, shares = found.shares_in_reach(), found.shares()
     expected = (found.outside[:, own].sum() + found.within["right arm"]) / area
     assert in_reach["right arm"] == pytest.approx(expected, rel=1e-6)
-    assert in_reach["right arm"] > 1.3 * shares["right arm"]
+    assert in_reach["right arm"] > 3.0 * shares["right arm"]
     assert in_reach["root"] == shares["root"]
     # Where the masks show much more than the body, they do not say which limb is off.
     smeared = dataclasses.replace(found, bare=0.021 * found.area.sum() / whole * found.bare)

@@ -125,23 +125,9 @@ def test_bare_silhouette_is_the_first_limbs_of_those_that_are_as_near() -> None:
 
 
 def test_points_are_given_to_the_first_of_the_limbs_that_are_as_near() -> None:
-    points, own = grid((40, 44), 1).astype(float), np.arange(len(LIMBS))
-    anywhere = np.ones((len(points), len(LIMBS)), np.bool_)
-    assert (
-        nearest_limbs(points, LIMBS, anywhere, own).tolist()
-        == distances(points, LIMBS).argmin(axis=1).tolist()
-    )
-    assert nearest_limbs(points, LIMBS[:1], anywhere, own).tolist() == [-1] * len(points)
-
-
-def test_points_are_given_to_limbs_that_may_lie_there() -> None:
-    """Two groups of limbs, of which the second may lie to the right of x = 20, and the first nowhere."""
-    points, groups = grid((40, 44), 1).astype(float), np.arange(len(LIMBS)) % 2
-    right = points[:, 0] > 20.0
-    allowed = np.stack([np.zeros(len(points), np.bool_), right], axis=1)
-    away = np.where(groups == 1, distances(points, LIMBS), np.inf)
-    expected = np.where(right, away.argmin(axis=1), -1)
-    assert nearest_limbs(points, LIMBS, allowed, groups).tolist() == expected.tolist()
+    points = grid((40, 44), 1).astype(float)
+    assert nearest_limbs(points, LIMBS).tolist() == distances(points, LIMBS).argmin(axis=1).tolist()
+    assert nearest_limbs(points, LIMBS[:1]).tolist() == [-1] * len(points)
 
 
 def test_where_no_limb_is_seen_nothing_is_bare() -> None:
