@@ -44,7 +44,7 @@ two neither."""
 
 
 class Placed(NamedTuple):
-    """The reach of G limbs of a pose. frames : (G, 3, 4) world from box. halves : (G,) mm, of a box's side, 0 of what
+    """The reach of G limbs of a pose. frames : (G, 3, 4) world from box. halves : (G,) mm, half a box's side, 0 of what
     reaches nowhere. cubes : (G, N, N, N) 1 in those of a box that the limb may lie in.
     """
 
@@ -83,7 +83,7 @@ class Reach:
         low, high = places.min(axis=0), places.max(axis=0)
         centre, half = 0.5 * (low + high), 0.5 * float((high - low).max()) + thick
         side = 2.0 * half / CUBES
-        at = ((places - centre + half) / side).astype(np.int64)
+        at = np.minimum((places - centre + half) / side, CUBES - 1).astype(np.int64)
         free = np.ones((CUBES, CUBES, CUBES), np.bool_)
         free[tuple(at.T)] = False
         away: Array = np.asarray(scipy.ndimage.distance_transform_edt(free))
@@ -133,7 +133,7 @@ class Reach:
 
 @lru_cache(maxsize=16)
 def reach_of(body: BodyModel, names: tuple[str, ...]) -> Reach:
-    """The reach of a body, kept: it takes a second. names : (L,) limb that each drawn one belongs to."""
+    """The reach of a body, kept: it takes half a second. names : (L,) limb that each drawn one belongs to."""
     return Reach(body, names)
 
 
