@@ -287,7 +287,7 @@ def _contradicted(
         return None
     mm = agreement.mm_per_pixel(pose)
     seen = without_hidden(silhouette_distances(evidence), agreement.cameras, mm, hidden)
-    return agreement.of(pose, seen)
+    return agreement.confirmed(agreement.of(pose, seen), pose, seen)
 
 
 def contradicted_limbs(

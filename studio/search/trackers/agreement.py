@@ -3,7 +3,7 @@ that no limb covers.
 
 A limb that lies on another one covers nothing wrong; only the silhouette that it leaves uncovered shows the error. So
 both are counted in every view, beyond a distance that allows for clothes and rough masks, and assigned to the nearest
-limb. Silhouette where that limb cannot be (`reach`) is none of the body's: a hand's forearm, an arm's gripper, shadow.
+limb. Silhouette that no limb can reach (`reach`) is none of the body's: a hand's forearm, an arm's gripper, a shadow.
 Everything is in mm² at a body of a person's size (`mm_at`), so that cameras, rates and the body's size do not matter.
 """
 
@@ -13,9 +13,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, moving_joint
+from studio.body.scale import scale_of
 from studio.foundations.arrays import Array, Indices, Mask
 from studio.foundations.geometry.camera import Camera
+from studio.foundations.geometry.projection import project
 from studio.search.likelihood.outlines import OutlineProjector
 from studio.search.trackers.agreement_kernels import (
     FIELDS,
@@ -24,6 +27,7 @@ from studio.search.trackers.agreement_kernels import (
     nearest_limbs,
     view_counts,
 )
+from studio.search.trackers.limb_reach import limb_reach_of
 from studio.search.trackers.mesh_agreement import MeshAgreement
 from studio.search.trackers.reach import reach_of
 from studio.search.trackers.refinement import Distances, mm_at
@@ -46,12 +50,12 @@ moved, goes from 33 to 72 and 58 mm (two seeds)."""
 @dataclass(frozen=True, slots=True, eq=False)
 class Disagreement:
     """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
-    than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest
-    if that may lie there (`reach`), of the root's if any limb may. limbs : (L,) name of the limb that each drawn one
-    belongs to, from the body's parameters. corners : (V, L, 4, 2) pixels of the pose's outlines. mm : (V,) size of a
-    pixel at the body. covered : of a body with meshes, for a view and a number of pixels, whether a link lies on the
-    middle of a cell of that size (H, W). within : by limb of several parts, what is bare where the limb may lie; empty
-    where hardly anything is bare.
+    than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb and within some limb's
+    reach, given to the nearest. limbs : (L,) name of the limb that each drawn one belongs to, from the body's
+    parameters. corners : (V, L, 4, 2) pixels of the pose's outlines. mm : (V,) size of a pixel at the body. covered :
+    of a body with meshes, for a view and a number of pixels, whether a link lies on the middle of a cell of that size
+    (H, W). within : by limb of several parts, what is bare no farther from where it begins than it is long; empty where
+    hardly anything is bare.
     """
 
     area: Array
@@ -97,10 +101,12 @@ class Agreement:
         self._limbs = limb_names(body)
         self._projector = OutlineProjector.of_body(body, cameras)
         self._meshes = MeshAgreement(body, cameras) if body.meshes else None
-        self._reach = reach_of(body, self._limbs)
-        self._groups = np.array([self._reach.limbs.index(limb) for limb in self._limbs])
-        self._of_parts = np.bincount(self._groups) > 1
-        """(G,) which limbs have several parts."""
+        scale, self._reaches = scale_of(body), dict[str, tuple[int, float]]()
+        """By limb of several parts the first of the drawn ones, and its length, mm at a person's size."""
+        for name in dict.fromkeys(self._limbs):
+            own = [number for number, limb in enumerate(self._limbs) if limb == name]
+            if len(own) > 1:
+                self._reaches[name] = own[0], sum(abs(body.drawn[number].length) for number in own) / scale
 
     def corners(self, pose: Array) -> Array:
         """(V, L, 4, 2) pixels of the outlines of a pose (D,)."""
@@ -124,35 +130,50 @@ class Agreement:
                 view_counts(quads, view.signed, view.corner, view.size, step, reach, own)
         for own, step, mm in zip(counts, steps, sizes, strict=True):
             own *= (step * mm) ** 2
-        area, uncovered = np.maximum(counts[..., 0].sum(axis=0), LEAST_AREA), counts[..., 2].sum(axis=0)
-        if self._reach.moves.any() and (uncovered > SOME_BARE * area).any():
+        if (
+            counts[..., 2].sum(axis=0) > SOME_BARE * np.maximum(counts[..., 0].sum(axis=0), LEAST_AREA)
+        ).any():
             bare = bare or _bare_points(corners, silhouettes, steps, far)
-            cells = [(step * mm) ** 2 for step, mm in zip(steps, sizes, strict=True)]
-            there = self._reach.limbs_there(pose, self.cameras, silhouettes, [own for own, _ in bare], sizes)
-            within = self._take_away(bare, there, cells, counts)
+            points = [places for places, _ in bare]
+            away = reach_of(self.body).beyond(pose, self.cameras, silhouettes, points, sizes, FAR_MM)
+            for own, (_, limbs), beyond, step, mm in zip(counts, bare, away, steps, sizes, strict=True):
+                np.subtract.at(own[:, 2], limbs[beyond], (step * mm) ** 2)
+            reached = [own[~beyond] for own, beyond in zip(points, away, strict=True)]
+            within = self._within(pose, reached, steps, sizes)
         return Disagreement(
             counts[..., 0], counts[..., 1], counts[..., 2], self._limbs, corners, sizes, covered, within
         )
 
-    def _take_away(
-        self,
-        bare: Sequence[tuple[Array, Indices]],
-        there: Sequence[Mask],
-        cells: Sequence[float],
-        counts: Array,
-    ) -> dict[str, float]:
-        """Take what is bare where the nearest limb cannot lie from the last column of counts (V, L, 3).
-
-        bare : of each view pixels (K, 2) and the nearest limbs (K,). there : (K, G) which limbs may lie there. cells :
-        mm² of a pixel of each view. Returns by limb of several parts what is bare where it may lie, mm².
+    def confirmed(self, off: Disagreement, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
+        """The disagreement of a pose (D,) with only what is bare where the limb that it was given to can be, and where
+        the other views agree (`limb_reach`); of the root's where any limb can.
         """
-        within = np.zeros(len(self._reach.limbs))
-        for (_, nearest), allowed, cell, own in zip(bare, there, cells, counts, strict=True):
-            elsewhere = ~allowed[np.arange(len(nearest)), self._groups[nearest]]
-            np.subtract.at(own[:, 2], nearest[elsewhere], cell)
-            within += allowed.sum(axis=0) * cell
-        of_limbs = zip(self._reach.limbs, within.tolist(), self._of_parts, strict=True)
-        return {limb: area for limb, area, has_parts in of_limbs if has_parts}
+        reach = limb_reach_of(self.body, self._limbs)
+        if not reach.moves.any() or not off.bare.any():
+            return off
+        steps, far = [max(1, round(GRID_MM / mm)) for mm in off.mm], [FAR_MM / mm for mm in off.mm]
+        if self._meshes is not None:
+            bare = self._meshes.counts(pose, silhouettes, steps, far)[1]
+        else:
+            bare = _bare_points(off.corners, silhouettes, steps, far)
+        there = reach.limbs_there(pose, self.cameras, silhouettes, [own for own, _ in bare], off.mm)
+        groups, found = np.array([reach.limbs.index(limb) for limb in self._limbs]), np.zeros(off.bare.shape)
+        for own, (_, limbs), allowed, step, mm in zip(found, bare, there, steps, off.mm, strict=True):
+            np.add.at(own, limbs[allowed[np.arange(len(limbs)), groups[limbs]]], (step * mm) ** 2)
+        return replace(off, bare=np.minimum(off.bare, found))
+
+    def _within(
+        self, pose: Array, bare: Sequence[Array], steps: Sequence[int], sizes: Sequence[float]
+    ) -> dict[str, float]:
+        """mm² of the bare points of each view (K, 2) within the length of limbs of several parts from their roots."""
+        roots = limb_ends(self.body, pose[None])[0, :, 0]
+        found = dict.fromkeys(self._reaches, 0.0)
+        for camera, points, step, mm in zip(self.cameras, bare, steps, sizes, strict=True):
+            places = project(camera, roots)[0]
+            for limb, (first, length) in self._reaches.items():
+                away = np.linalg.norm(points - places[first], axis=1)
+                found[limb] += float(np.count_nonzero(away * mm <= length)) * (step * mm) ** 2
+        return found
 
     def of_places(self, poses: Array, silhouettes: Sequence[Distances], without: str | None = None) -> Array:
         """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a

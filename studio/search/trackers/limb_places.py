@@ -8,7 +8,6 @@ from studio.evidence.cells import cell_at
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.numba_in_threads import EXACT, njit
 from studio.search.trackers.agreement_kernels import distance_to
-from studio.search.trackers.reach import is_reached
 from studio.search.trackers.refinement_kernels import box_of, is_seen, turning
 
 SAME, CHANGED, OPEN = 0, 1, 2
@@ -131,9 +130,8 @@ def places_left_bare(
     begins: NDArray[np.int64],
     maps: NDArray[np.int64],
     views: Array,
-    frames: Array,
-    halves: Array,
-    cubes: Bytes,
+    roots: Array,
+    reaches: Array,
     low: Array,
     steps: NDArray[np.int64],
     spacing: float,
@@ -144,10 +142,10 @@ def places_left_bare(
 
     kinds, near : of all cells; near is above 0 beside a limb. rough : of squares of ROUGH by ROUGH cells, 0 where no
     place of a block around one seen there can have changed; begins : (V, 2) where a view's squares begin among all, and
-    their columns. maps, views : as of `cell_at`. frames, halves, cubes : as of
-    `reach.Placed`, halves 0 for limbs that do not count. low : (3,) and steps : (3,) of the grid, in blocks.
+    their columns. maps, views : as of `cell_at`. roots : (G, 3) mm, and reaches : (G,) mm, 0 for limbs that do not
+    count. low : (3,) and steps : (3,) of the grid, in blocks.
     """
-    limbs, filled = len(halves), 0
+    limbs, filled = len(reaches), 0
     found, within = np.zeros(limbs, np.int64), np.zeros(limbs, np.bool_)
     half = 0.5 * (BLOCK - 1) * spacing
     for block in range(steps[0] * steps[1] * steps[2]):
@@ -163,8 +161,8 @@ def places_left_bare(
         )
         anywhere = False
         for limb in range(limbs):
-            dx, dy, dz = x - frames[limb, 0, 3], y - frames[limb, 1, 3], z - frames[limb, 2, 3]
-            reach = np.sqrt(3.0) * (halves[limb] + half) if halves[limb] > 0.0 else 0.0
+            dx, dy, dz = x - roots[limb, 0], y - roots[limb, 1], z - roots[limb, 2]
+            reach = reaches[limb] + np.sqrt(3.0) * half if reaches[limb] > 0.0 else 0.0
             anywhere |= dx * dx + dy * dy + dz * dz < reach * reach
         if not anywhere or is_empty(rough, begins, maps, views, x, y, z):
             continue
@@ -178,7 +176,8 @@ def places_left_bare(
                     )
                     anywhere = False
                     for limb in range(limbs):
-                        within[limb] = is_reached(frames, halves, cubes, limb, x, y, z)
+                        dx, dy, dz = x - roots[limb, 0], y - roots[limb, 1], z - roots[limb, 2]
+                        within[limb] = dx * dx + dy * dy + dz * dz < reaches[limb] * reaches[limb]
                         anywhere |= within[limb]
                     if not anywhere:
                         continue

@@ -2,9 +2,9 @@
 
 The silhouettes cannot witness against a limb that they lack, as where the shadow test has taken bare arms for the
 floor's shadow. What differs from the background at all, shadows too, still has them. A grid of points is projected into
-all views: a point where a limb can be (`reach`), and that lies on changed cells in every view that sees it, and in two
-views or more far from all limbs of the pose, is something that the pose does not explain. A shadow on the floor is
-none: only points well above the floor count. Of the limbs that can be at such points those are elsewhere whose own
+all views: a point within a limb's reach that lies on changed cells in every view that sees it, and in two views or more
+far from all limbs of the pose, is something that the pose does not explain. A shadow on the floor is none: only points
+well above the floor count. Of the limbs in whose reach such points lie those are elsewhere whose own
 projection explains little: a limb that is where it seems covers changed cells that no other limb covers, and a lost one
 lies outside them, or on other limbs.
 
@@ -21,6 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, Limb
 from studio.body.scale import scale_of
 from studio.evidence.cells import cell_size
@@ -42,7 +43,7 @@ from studio.search.trackers.limb_places import (
     places_left_bare,
     squares_of,
 )
-from studio.search.trackers.reach import numbers_of, reach_of
+from studio.search.trackers.limb_reach import numbers_of
 from studio.search.trackers.tracker import HIDDEN
 
 SPACING = 35.0
@@ -74,6 +75,8 @@ MOSTLY_EXPLAINED = 0.8
 cameras moved, are no longer named."""
 AROUND_MM, MOST_PLACES = 45.0, 4096
 """mm at a person's size, up to which what changed beside a place is a limb's that is elsewhere; the most places."""
+REACH = 1.05
+"""Times a limb's length: how far from its root it may end."""
 WIDER = 1.2
 """Times a block's radius in pixels, for a lens that distorts."""
 
@@ -139,11 +142,13 @@ class LimbsElsewhere:
         self._limbs = tuple(dict.fromkeys(names))
         self._owners = np.array([self._limbs.index(name) for name in names])
         self._bending = tuple(limb for limb in self._limbs if names.count(limb) > 1)
+        self._roots = np.array([names.index(limb) for limb in self._limbs])
+        lengths, volumes = np.array([(abs(limb.length), _volume(limb)) for limb in body.drawn]).T
         own = np.arange(len(self._limbs))[:, None] == self._owners
-        self._volumes = own @ np.array([_volume(limb) for limb in body.drawn])
-        self._reach, self._views = reach_of(body, names), np.array([numbers_of(camera) for camera in cameras])
-        self._free = self._reach.moves & np.array([limb in self._bending for limb in self._limbs])
-        self.usable = len(cameras) >= LEAST_VIEWS and bool(self._free.any())
+        bends = np.array([limb in self._bending for limb in self._limbs])
+        self._reaches, self._volumes = np.where(bends, REACH * (own @ lengths), 0.0), own @ volumes
+        self._views = np.array([numbers_of(camera) for camera in cameras])
+        self.usable = len(cameras) >= LEAST_VIEWS and bool(self._bending)
 
     def of(
         self, pose: Array, changed: Sequence[Change], memory: Mapping[str, Array] | None = None
@@ -151,7 +156,7 @@ class LimbsElsewhere:
         """By limb with a joint of its own, as named in the body's parameters. pose : (D,). changed : one a camera.
         memory : of the frame's start, with known occlusions.
         """
-        bare, own, _ = self._look(pose, changed, memory, self._bending)
+        bare, own, _ = self._look(pose, changed, memory, self._reaches)
         spacing = SPACING * self._scale
         found = dict[str, Elsewhere]()
         for limb in self._bending:
@@ -174,7 +179,8 @@ class LimbsElsewhere:
         """By camera pixels (K, 2), and up to how many pixels from them the pictures show some limbs of a pose that are
         elsewhere. Others : as of `of`.
         """
-        _, _, places = self._look(pose, changed, memory, limbs, MOST_PLACES)
+        reaches = np.where([limb in limbs for limb in self._limbs], self._reaches, 0.0)
+        _, _, places = self._look(pose, changed, memory, reaches, MOST_PLACES)
         sizes = self._agreement.mm_per_pixel(pose)
         return {
             camera.name: (_pixels(camera, places), AROUND_MM / mm)
@@ -186,21 +192,19 @@ class LimbsElsewhere:
         pose: Array,
         changed: Sequence[Change],
         memory: Mapping[str, Array] | None,
-        limbs: Collection[str],
+        reaches: Array,
         most: int = 0,
     ) -> tuple[NDArray[np.int64], Array, Array]:
         """(G,) how many places within a limb's reach changed and are left bare; (3, G) mm² in which each limb lies,
-        alone, and of these what changed; (K, 3) the first `most` of the places. limbs : that are looked for.
+        alone, and of these what changed; (K, 3) the first `most` of the places. reaches : (G,) mm, 0 for limbs that are
+        not looked for.
         """
         corners, sizes = self._agreement.corners(pose), self._agreement.mm_per_pixel(pose)
-        free = self._free & np.array([limb in limbs for limb in self._limbs])
-        frames, halves, cubes = self._reach.placed(pose)
-        halves = np.where(free, halves, 0.0)
-        centres, reaches = frames[:, :, 3], np.sqrt(3.0) * halves
+        ends = limb_ends(self._body, pose[None])[0]
         maps, begin = np.zeros((len(changed), 4), np.int64), 0
         kinds, near, own = list[Bytes](), list[Bytes](), np.zeros((3, len(self._limbs)))
         rough, begins = list[Bytes](), np.zeros((len(changed), 2), np.int64)
-        spacing = SPACING * self._scale
+        roots, spacing = ends[self._roots, 0], SPACING * self._scale
         radius = 0.5 * np.sqrt(3.0) * (BLOCK - 1) * spacing
         for number, (camera, view, mm) in enumerate(zip(self._cameras, changed, sizes, strict=True)):
             seen = _with_hidden(view.kinds, view.size, camera, memory)
@@ -210,13 +214,14 @@ class LimbsElsewhere:
             own += counts
             kinds.append(seen.ravel())
             near.append(beside.ravel())
-            nearest = (centres @ camera.rotation[2] + camera.translation[2] - reaches)[free].min() - radius
+            nearest = (roots @ camera.rotation[2] + camera.translation[2] - reaches).min() - radius
             wide = WIDER * float(camera.matrix[0, 0]) * radius / max(nearest, radius) / view.size
             squares = _squares_around(seen, wide)
             begins[number] = sum(map(len, rough)), squares.shape[1]
             rough.append(squares.ravel())
-        low = (centres - reaches[:, None])[free].min(axis=0)
-        high = (centres + reaches[:, None])[free].max(axis=0)
+        free = reaches > 0.0
+        low = (roots - reaches[:, None])[free].min(axis=0)
+        high = (roots + reaches[:, None])[free].max(axis=0)
         low[2] = max(low[2], ABOVE_FLOOR * self._scale)
         steps = np.maximum(np.ceil((high - low) / (spacing * BLOCK)), 1.0).astype(np.int64)
         places = np.zeros((most, 3))
@@ -227,9 +232,8 @@ class LimbsElsewhere:
             begins,
             maps,
             self._views,
-            frames,
-            halves,
-            cubes,
+            roots,
+            reaches,
             low,
             steps,
             spacing,

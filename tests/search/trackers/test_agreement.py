@@ -108,5 +108,8 @@ def test_a_lump_that_one_view_alone_shows_is_no_limbs(body: BodyModel) -> None:
             camera = next(one for one in agreement.cameras if one.name == view.camera)
             at = np.round(project(camera, beside)[0]).astype(int)
             cv2.circle(view.mask, tuple(at.tolist()), 12, 255, -1)
-        found = agreement.of(truth, silhouette_distances(evidence)).shares()
-        assert (found["left arm"] > LIMB_LOST_SHARE) == is_named
+        seen = silhouette_distances(evidence)
+        off = agreement.of(truth, seen)
+        assert off.shares()["left arm"] > LIMB_LOST_SHARE
+        named = agreement.confirmed(off, truth, seen).shares()
+        assert (named["left arm"] > LIMB_LOST_SHARE) == is_named

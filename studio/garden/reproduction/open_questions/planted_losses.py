@@ -227,7 +227,7 @@ class Looking:
         certainty = self._certainty.of(pose, matrix, {})
         for _ in range(2):
             certainty = self._certainty.of(pose, matrix, certainty.moved)
-        off = self._agreement.of(pose, seen)
+        off = self._agreement.confirmed(self._agreement.of(pose, seen), pose, seen)
         elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
         reported = reported_lost(self.body, pose, reported_limbs(self._network, pose, pictures, elsewhere))
         lost = certainty.lost(off, elsewhere, reported)
