@@ -21,7 +21,7 @@ from studio.body.model import BodyModel
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import next_frame_knob
-from studio.search.trackers.agreement import Agreement, Disagreement
+from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.hidden_areas import learnt, without_hidden
 from studio.search.trackers.limb_certainty import CertaintyOfLimbs
 from studio.search.trackers.limb_colours import ColouredView, LimbColours
@@ -219,7 +219,7 @@ class FrameRefiner:
             carried=dataclasses.replace(carried, memory=memory),
             evaluations=result.evaluations + frame.evaluations,
             disagreement=frame.off.shares(),
-            limb_loss=certainty.lost(frame.confirmed(), frame.elsewhere, lost, frame.along_lines()),
+            limb_loss=certainty.lost(frame.off, frame.elsewhere, lost, frame.along_lines()),
         )
 
     def _made_for(
@@ -350,10 +350,6 @@ class _FrameInWork:
 
     def _lines_of(self, thin: ThinLimb, pose: Array) -> list[Lines | None]:
         return thin.lines(pose, self._changes, self._tools.agreement.corners(pose))
-
-    def confirmed(self) -> Disagreement:
-        """Where pose and silhouettes disagree so that limbs are named for it."""
-        return self._tools.agreement.confirmed(self.off, self.pose, self.silhouettes)
 
     def along_lines(self) -> dict[str, float]:
         """By thin limb how plainly lines run along it, where they are seen."""

@@ -1,9 +1,10 @@
 """Where each limb of a body can be while what it hangs from stays where it is, and the other views show silhouette.
 
-Only there does what a silhouette leaves bare say that the limb is lost. A lump of shadow, droppings or a reflection
-lies bare beside a limb in one view; whatever hides in the ray through it the others see through. A mouse arches its
-back above its haunches: no haunch gets there. Limbs are drawn anew by what no limb at all can reach (`reach`), which is
-less strict; by this reach a rearing mouse was searched worse (17 instead of 10 mm in the second labelled frame).
+Only there does what a silhouette leaves bare contradict the limb in a check. A lump of shadow, droppings or a
+reflection lies bare beside a limb in one view; whatever hides in the ray through it the others see through. A mouse
+arches its back above its haunches: no haunch gets there. A run, which draws limbs anew and counts frames as well
+tracked by what it names, asks what no limb at all can reach (`reach`): by this reach a rearing mouse was searched worse
+(16 and 17 instead of 10 mm in the second labelled frame).
 
 Poses are drawn within the limits. For each limb the cubes that it lies in are kept, in the frame of what it hangs from.
 """

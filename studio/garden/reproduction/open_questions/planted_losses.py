@@ -227,12 +227,13 @@ class Looking:
         certainty = self._certainty.of(pose, matrix, {})
         for _ in range(2):
             certainty = self._certainty.of(pose, matrix, certainty.moved)
-        off = self._agreement.confirmed(self._agreement.of(pose, seen), pose, seen)
+        off = self._agreement.of(pose, seen)
         elsewhere = self._witness.of(pose, changed[: len(self.cameras)])
         reported = reported_lost(self.body, pose, reported_limbs(self._network, pose, pictures, elsewhere))
         lost = certainty.lost(off, elsewhere, reported)
         by_run = [limb for limb, value in lost.items() if value > LIMB_LOST_PROBABILITY]
-        return tuple(by_run), tuple(contradicted_limbs(off, elsewhere, reported))
+        confirmed = self._agreement.confirmed(off, pose, seen)
+        return tuple(by_run), tuple(contradicted_limbs(confirmed, elsewhere, reported))
 
     def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[Bytes]:
         """Each view's mask (H, W) without a limb of a pose, where no other limb of it lies."""
