@@ -119,7 +119,7 @@ class Agreement:
     def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
         """Where a pose (D,) and a frame's silhouettes, one a camera, disagree."""
         corners, sizes = self.corners(pose), self.mm_per_pixel(pose)
-        steps, far = [max(1, round(GRID_MM / mm)) for mm in sizes], [FAR_MM / mm for mm in sizes]
+        steps, far = _grid(sizes)
         bare, covered, within = None, None, dict[str, float]()
         if self._meshes is not None:
             counts, bare = self._meshes.counts(pose, silhouettes, steps, far)
@@ -151,7 +151,7 @@ class Agreement:
         reach = limb_reach_of(self.body, self._limbs)
         if not reach.moves.any() or not off.bare.any():
             return off
-        steps, far = [max(1, round(GRID_MM / mm)) for mm in off.mm], [FAR_MM / mm for mm in off.mm]
+        steps, far = _grid(off.mm)
         if self._meshes is not None:
             bare = self._meshes.counts(pose, silhouettes, steps, far)[1]
         else:
@@ -201,6 +201,11 @@ def without_bare(off: Disagreement, limbs: Collection[str] | None = None) -> Dis
     """
     kept = np.array([limbs is not None and limb not in limbs for limb in off.limbs])
     return replace(off, bare=np.where(kept, off.bare, 0.0), within={})
+
+
+def _grid(sizes: Sequence[float]) -> tuple[list[int], list[float]]:
+    """Pixels between the points that are counted, and FAR_MM in pixels, by view. sizes : mm of a pixel of each."""
+    return [max(1, round(GRID_MM / mm)) for mm in sizes], [FAR_MM / mm for mm in sizes]
 
 
 def _bare_points(

@@ -2,7 +2,7 @@
 
 Only there does what a silhouette leaves bare contradict the limb in a check. A lump of shadow, droppings or a
 reflection lies bare beside a limb in one view; whatever hides in the ray through it the others see through. A mouse
-arches its back above its haunches: no haunch gets there. A run, which draws limbs anew and counts frames as well
+arches its back above its haunches: no haunch gets there. A run, which draws limbs again and counts frames as well
 tracked by what it names, asks what no limb at all can reach (`reach`): by this reach a rearing mouse was searched worse
 (16 and 17 instead of 10 mm in the second labelled frame).
 
@@ -25,7 +25,7 @@ from studio.foundations.arrays import Array, Bytes, Floats
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import directions
 from studio.foundations.numba_in_threads import EXACT, njit
-from studio.search.trackers.reach import drawn_within_limits
+from studio.search.trackers.reach import drawn_within_limits, places_along, seen_from, thickness_of
 from studio.search.trackers.refinement import Distances
 
 CUBES, AROUND = 24, 1.5
@@ -68,10 +68,8 @@ class LimbReach:
             if joint < 0:
                 continue
             parts = [part for part, name in enumerate(names) if name == limb]
-            above = frames[:, joint]
-            own = np.einsum("nji,nlej->nlei", above[:, :, :3], ends[:, parts] - above[:, None, None, :, 3])
-            places = own[:, :, :1] + ALONG[:, None] * (own[:, :, 1:] - own[:, :, :1])
-            thick = max(_thickness(body, part) for part in parts)
+            places = places_along(seen_from(frames[:, joint], ends[:, parts]), ALONG)
+            thick = max(thickness_of(body.drawn[part]) for part in parts)
             self._keep(number, places.reshape(-1, 3), thick)
         self.moves = self._halves > 0.0
 
@@ -152,12 +150,6 @@ def _hung_from(body: BodyModel, names: Sequence[str], limb: str) -> int:
     return -1
 
 
-def _thickness(body: BodyModel, part: int) -> float:
-    """mm, the largest radius of a drawn limb."""
-    limb = body.drawn[part]
-    return max(limb.radius_start, limb.radius_end) * max(limb.scale_x, limb.scale_y)
-
-
 @njit(**EXACT)
 def is_reached(frames: Array, halves: Array, cubes: Bytes, limb: int, x: float, y: float, z: float) -> bool:
     """Whether a limb may lie at a place, mm. Others : as of `Placed`."""
@@ -225,7 +217,7 @@ def fill_limbs_there(
     begins, rows and columns of the picture, and 1. views : as of `cell_at`. near : (V,) pixels. owner : the view. eye :
     (3,) mm. frames, halves, cubes : as of `Placed`. step : mm. least : as of `is_agreed`.
     """
-    entry, leaving = np.zeros(len(halves)), np.zeros(len(halves))
+    entry, leaving, new = np.zeros(len(halves)), np.zeros(len(halves)), np.zeros(len(halves), np.bool_)
     for ray in range(len(rays)):
         x, y, z = rays[ray]
         first, last = np.inf, -np.inf
@@ -240,13 +232,10 @@ def fill_limbs_there(
         if first > last:
             continue
         for number in range(int(np.ceil(max(first, step) / step)), int(np.floor(max(last, 0.0) / step)) + 1):
-            depth, wanted = number * step, False
+            depth = number * step
             px, py, pz = eye[0] + depth * x, eye[1] + depth * y, eye[2] + depth * z
             for limb in range(len(halves)):
-                if entry[limb] <= depth <= leaving[limb] and not found[ray, limb]:
-                    wanted |= is_reached(frames, halves, cubes, limb, px, py, pz)
-            if not wanted or not is_agreed(signed, corners, maps, views, near, owner, (px, py, pz), least):
-                continue
-            for limb in range(len(halves)):
-                if entry[limb] <= depth <= leaving[limb] and not found[ray, limb]:
-                    found[ray, limb] = is_reached(frames, halves, cubes, limb, px, py, pz)
+                new[limb] = entry[limb] <= depth <= leaving[limb] and not found[ray, limb]
+                new[limb] = new[limb] and is_reached(frames, halves, cubes, limb, px, py, pz)
+            if new.any() and is_agreed(signed, corners, maps, views, near, owner, (px, py, pz), least):
+                found[ray] |= new

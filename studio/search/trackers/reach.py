@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from studio.body.forward_kinematics import joint_frames, limb_ends
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, Limb
 from studio.body.scale import scale_of
 from studio.evidence.volume.alignment import root_parameters
 from studio.foundations.arrays import Array
@@ -41,13 +41,11 @@ class Reach:
         rest, poses = drawn_within_limits(body)
         frames = joint_frames(body, np.concatenate([rest[None], poses]))[:, self._root]
         ends = limb_ends(body, np.concatenate([rest[None], poses]))
-        own = np.einsum("nji,nlej->nlei", frames[:, :, :3], ends - frames[:, None, None, :, 3])
+        own = seen_from(frames, ends)
         moved = np.abs(own[1:] - own[:1]).max(axis=(0, 2, 3)) > 1e-6
-        sizes = [
-            max(limb.radius_start, limb.radius_end) * max(limb.scale_x, limb.scale_y) for limb in body.drawn
-        ]
+        sizes = [thickness_of(limb) for limb in body.drawn]
         side = CUBE_MM * scale_of(body)
-        places = own[:, moved, :1] + ALONG[:, None] * (own[:, moved, 1:] - own[:, moved, :1])
+        places = places_along(own[:, moved], ALONG)
         self._points = _one_a_cube(places.reshape(-1, 3), side)
         self._thick = max((size for size, moves in zip(sizes, moved, strict=True) if moves), default=0.0)
         self._within = 0.5 * np.sqrt(3.0) * side
@@ -106,6 +104,21 @@ def _near(silhouette: Distances, pixels: Array, reach: float) -> NDArray[np.bool
 def reach_of(body: BodyModel) -> Reach:
     """The reach of a body, kept: it takes a quarter of a second."""
     return Reach(body)
+
+
+def thickness_of(limb: Limb) -> float:
+    """mm, the largest radius of a drawn limb."""
+    return max(limb.radius_start, limb.radius_end) * max(limb.scale_x, limb.scale_y)
+
+
+def seen_from(frames: Array, ends: Array) -> Array:
+    """(N, L, 2, 3) ends of limbs, mm in frames (N, 3, 4) of the world. ends : (N, L, 2, 3) mm, world."""
+    return np.einsum("nji,nlej->nlei", frames[:, :, :3], ends - frames[:, None, None, :, 3])
+
+
+def places_along(ends: Array, shares: Array) -> Array:
+    """(N, L, K, 3) at shares (K,) of the way between ends (N, L, 2, 3)."""
+    return ends[:, :, :1] + shares[:, None] * (ends[:, :, 1:] - ends[:, :, :1])
 
 
 def drawn_within_limits(body: BodyModel) -> tuple[Array, Array]:
