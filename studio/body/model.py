@@ -251,6 +251,28 @@ def ends_of(body: BodyModel, limbs: Sequence[Limb]) -> Mask:
     )
 
 
+def free_ends(body: BodyModel) -> Mask:
+    """(L,) whether a drawn limb's far end is an end of the body (fingers, toes, crown): no limb hangs from it, not even
+    one of zero length.
+    """
+    drawn = np.array([limb.length != 0.0 for limb in body.limbs], dtype=np.bool_)
+    return ends_of(body, body.limbs)[drawn]
+
+
+def rigid_limbs(body: BodyModel) -> Mask:
+    """(L,) whether a drawn limb ends the body at a joint that cannot turn (the papers' hands and feet): it is fixed to
+    a joint that turns and has a limb itself. Where all parts of a link lie on fixed joints (a robot's housings, an
+    animal's head and ears), they are its shape.
+
+    A person's wrists and ankles do turn, so where such a limb is off a little, the shin or forearm need not be wrong.
+    """
+    ends = free_ends(body)
+    still = [not body.joints[limb.joint].parameters for limb in body.drawn]
+    joints = [limb.joint for limb in body.drawn]
+    follows = np.array([moving_joint(body, joint) in joints for joint in joints], dtype=np.bool_)
+    return ends & follows & np.array(still, dtype=np.bool_)
+
+
 def extremities(body: BodyModel) -> tuple[int, ...]:
     """Indices of the drawn limbs on which no other drawn limb's joint hangs."""
     return tuple(int(index) for index in np.flatnonzero(ends_of(body, body.drawn)))

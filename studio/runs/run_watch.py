@@ -200,7 +200,7 @@ class RunWatch:
         settings = self._settings_in(frame)
         if standing.weighed != _weighting_of(settings):
             standing.watch, standing.weighed = self._new_watch(settings), _weighting_of(settings)
-        if state in (TRACKED, RECOVERED) and not misses:
+        if state in (TRACKED, RECOVERED, LIMB_LOST) and not misses:
             standing.watch.well_tracked(log_weight, overlap)
         standing.streak = standing.streak + 1 if state == standing.state else 1
         standing.state, standing.doubts = state, misses

@@ -42,11 +42,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from studio.body.forward_kinematics import limb_ends
+from studio.body.model import rigid_limbs
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array
 from studio.search.trackers.agreement import LEAST_AREA, Disagreement, limb_names
 from studio.search.trackers.limbs_elsewhere import Elsewhere, is_shown, lost_of, without_sure
-from studio.search.trackers.refinement import Refiner, rigid_limbs
+from studio.search.trackers.refinement import Refiner
 from studio.search.trackers.thin_limbs import HALF_PLAIN
 from studio.search.trackers.tracker import LIMB_LOST_SHARE, MOVED
 

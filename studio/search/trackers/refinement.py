@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_ends
-from studio.body.model import BodyModel, ends_of, moving_joint
+from studio.body.model import BodyModel, free_ends, moving_joint, rigid_limbs
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array, Indices
 from studio.foundations.geometry.camera import Camera
@@ -57,7 +57,10 @@ SPREAD_PULL = 15.0
 """mm that an angle is pulled by at its usual deviation from rest, where the body says one."""
 HALFWAY = 0.5
 SLACK_MM = 50.0
-"""mm by which a hand or foot without a joint (`rigid_limbs`) may be off at no cost: a wrist turns it by so much."""
+"""mm by which a hand or foot without a joint (`rigid_limbs`) may be off at no cost: a wrist turns it by so much. It
+explains the border that it is near to, but pulls the limbs above it only by what is beyond. Measured on a rendered walk
+with turns: rigid feet without slack pull the legs and the trunk 20 to 30 mm down, rigid hands the arms 10 mm. But a
+hand in front of the trunk may be all that shows how far the elbow is bent."""
 MESH_PIXELS = (4.0, 1.5)
 """Pixels: widths c of the loss by which a body with meshes is refined in turn, in place of the settings' scale: its
 outlines are as good as the masks, of which pieces may be missing. On a robot's arm whose masks end before the last link
@@ -341,14 +344,6 @@ class _Prepared:
         return borders, maps
 
 
-def free_ends(body: BodyModel) -> NDArray[np.bool_]:
-    """(L,) whether a drawn limb's far end is an end of the body (fingers, toes, crown): no limb hangs from it, not even
-    one of zero length.
-    """
-    drawn = np.array([limb.length != 0.0 for limb in body.limbs], dtype=np.bool_)
-    return ends_of(body, body.limbs)[drawn]
-
-
 def hidden_angles(body: BodyModel) -> NDArray[np.bool_]:
     """(D,) whether a parameter moves only joints that bear no drawn limb themselves; a limb on a fixed joint is borne
     by what that one is fixed to.
@@ -357,24 +352,6 @@ def hidden_angles(body: BodyModel) -> NDArray[np.bool_]:
     moves = [{s.parameter for s in joint.steps if s.parameter >= 0} for joint in body.joints]
     shown = set[int]().union(*(moves[number] for number in bearing)) if bearing else set[int]()
     return np.array([number not in shown for number in range(len(body.parameters))], dtype=np.bool_)
-
-
-def rigid_limbs(body: BodyModel) -> NDArray[np.bool_]:
-    """(L,) whether a drawn limb ends the body at a joint that cannot turn (the papers' hands and feet): it is fixed to
-    a joint that turns and has a limb itself. Where all parts of a link lie on fixed joints (a robot's housings, an
-    animal's head and ears), they are its shape.
-
-    A person's wrists and ankles do turn, so where such a limb and the silhouette disagree a little, the shin or
-    forearm need not be wrong: it explains the border that it is near to, but pulls the limbs above it only by what is
-    beyond SLACK_MM. Measured on a rendered walk with turns: rigid feet without slack pull the legs and the
-    trunk 20 to 30 mm down, rigid hands the arms 10 mm. But a hand in front of the trunk may be all that shows how far
-    the elbow is bent.
-    """
-    ends = free_ends(body)
-    still = [not body.joints[limb.joint].parameters for limb in body.drawn]
-    joints = [limb.joint for limb in body.drawn]
-    follows = np.array([moving_joint(body, joint) in joints for joint in joints], dtype=np.bool_)
-    return ends & follows & np.array(still, dtype=np.bool_)
 
 
 def _about_the_border(view: Distances, margin: float) -> tuple[tuple[int, int], NDArray[np.float32]]:

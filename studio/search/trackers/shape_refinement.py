@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.model import free_ends, rigid_limbs
 from studio.body.scale import scale_of
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
@@ -37,10 +38,8 @@ from studio.search.trackers.refinement import (
     MOST_DAMPING,
     TIGHTENED,
     Distances,
-    free_ends,
     hidden_angles,
     mm_at,
-    rigid_limbs,
 )
 from studio.search.trackers.refinement_kernels import normal_equations
 from studio.search.trackers.shape_prior import ShapePrior

@@ -7,8 +7,9 @@ from moving_bodies import standing
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, rigid_limbs
 from studio.body.shape_space import shape_space
+from studio.body.subject import Subject, fit_subject
 from studio.evidence.distance_maps import silhouette_distances
 from studio.foundations.arrays import Array
 from studio.search.trackers.floor_hold import FloorHold, FloorHoldOfShapes, Heights, has_floor, pull_of
@@ -68,6 +69,22 @@ def test_the_gradient_is_that_of_half_the_loss(depth: float) -> None:
 
 def test_nothing_is_pulled_above_the_floor() -> None:
     assert FloorHold(BODY, UNIT, STEP).of(sunk(-1.0)) is None
+
+
+def test_a_foot_that_cannot_bend_is_left_in_the_floor() -> None:
+    """With a heel lifted the toe of a foot that is fixed to its shin lies below the floor, and nothing is wrong."""
+    papers, _ = fit_subject(load_body("human31"), Subject(height_mm=1760.0))
+    assert [limb.name for limb, one in zip(papers.drawn, rigid_limbs(papers), strict=True) if one][:1] == [
+        "left foot"
+    ]
+    pose = standing(papers, left_knee_ry=-0.9, right_knee_ry=-0.9)  # On tiptoe, the shins leaning.
+    toe = [limb.name for limb in papers.drawn].index("left foot"), 1
+    pose[[entry.name for entry in papers.parameters].index("pelvis_z")] -= (
+        limb_ends(papers, pose)[0][toe][2] + 40.0
+    )
+    assert limb_ends(papers, pose)[0][toe][2] == pytest.approx(-40.0)
+    hold = FloorHold(papers, np.where(papers.angles, 1.0, 300.0), STEP)
+    assert hold.of(pose) is None
 
 
 def test_only_who_is_sized_by_a_height_has_a_floor() -> None:

@@ -12,7 +12,7 @@ from moving_bodies import standing
 
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import marker_points
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, rigid_limbs
 from studio.body.subject import Subject, fit_subject
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
@@ -21,7 +21,7 @@ from studio.runs.search_space import default_sigma, search_space
 from studio.search.likelihood.catalogue import WEIGHTINGS
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner, space_after
 from studio.search.trackers.limbs_elsewhere import changes_by_camera
-from studio.search.trackers.refinement import RefinementSettings, Refiner, rigid_limbs
+from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.tracker import (
     Estimate,
     FilterState,

@@ -9,12 +9,12 @@ from moving_bodies import standing
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, rigid_limbs
 from studio.body.scale import scale_of
 from studio.search.trackers.agreement import Agreement, Disagreement, limb_names
 from studio.search.trackers.hidden_areas import cell_size, counts_of, learnt, without_hidden
 from studio.search.trackers.limb_certainty import ENDS, JUMPS, Certainty, CertaintyOfLimbs
-from studio.search.trackers.refinement import RefinementSettings, Refiner, mm_at, rigid_limbs
+from studio.search.trackers.refinement import RefinementSettings, Refiner, mm_at
 from studio.search.trackers.tracker import HIDDEN
 
 Array = np.ndarray

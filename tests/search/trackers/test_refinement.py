@@ -8,15 +8,13 @@ from drawn_people import drawn_evidence, ring_of_cameras
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, free_ends, rigid_limbs
 from studio.evidence.distance_maps import SilhouetteDistances, silhouette_distances
 from studio.results.drawing_footage.recipe_file import RECIPES
 from studio.search.trackers.refinement import (
     RefinementSettings,
     Refiner,
-    free_ends,
     hidden_angles,
-    rigid_limbs,
 )
 from studio.search.trackers.refinement_kernels import MARGIN, look_at_limbs
 
