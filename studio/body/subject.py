@@ -35,9 +35,10 @@ import tomli_w
 from numpy.typing import ArrayLike
 
 from studio.body.catalogue import load_body
-from studio.body.dimensions import with_dimensions
+from studio.body.dimensions import follows_height, with_dimensions
 from studio.body.marker_distances import MarkerDistances
 from studio.body.model import BodyModel
+from studio.body.scale import scale_of
 from studio.foundations.errors import BodyError
 from studio.foundations.foreign_files import foreign_file, read_foreign_text
 from studio.foundations.typed_decoding import decode_toml
@@ -51,6 +52,8 @@ STANDING_WEIGHT = 0.03
 FIT_STEPS = 20
 
 SHORTEST_MM, TALLEST_MM = 300.0, 3000.0
+REPORTED_SPREAD, UNKNOWN_SPREAD = 15.0, 90.0
+"""mm: standard deviation of a height that was given, and among people."""
 LONGEST_MM = 10_000.0
 """Longest limb or distance of markers, mm; ratios are far below it."""
 
@@ -154,6 +157,17 @@ def fit_subject(
             notes.append(f"No height_mm was given: {height:.0f} mm follows from the lengths.")
     missing = _proportions(body, height, {**given, **fitted}) if height else {}
     return with_dimensions(body, {**missing, **fitted}), tuple(notes)
+
+
+def height_spread(body: BodyModel, subject: Subject | None) -> float | None:
+    """mm by which the height may be off, of which alone a body's lengths were guessed; None where any was measured, or
+    where they are no shares of a height.
+
+    subject : whose body it is; None where nothing is known.
+    """
+    if not follows_height(body) or (subject is not None and (subject.lengths_mm or subject.dimensions_mm)):
+        return None
+    return REPORTED_SPREAD if subject is not None and subject.height_mm else UNKNOWN_SPREAD * scale_of(body)
 
 
 def in_lengths(subject: Subject, own_body: BodyModel) -> Subject:

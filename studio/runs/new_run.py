@@ -14,7 +14,7 @@ from pydantic import Field
 from studio.body.branches import within_limits
 from studio.body.catalogue import body_file_text
 from studio.body.model import BodyModel
-from studio.body.subject import Subject, read_subject
+from studio.body.subject import Subject, height_spread, read_subject
 from studio.foundations.arrays import Array
 from studio.foundations.declaring import (
     AllowInconsistent,
@@ -192,7 +192,10 @@ def prepare_run(
         )
     before = dict(tree.dimensions)
     if fit_shape and not live and start is not None and not tree.meshes:
-        tree, start, words = fit_session_shape(session, tree, settings, start, first, progress)
+        spread = height_spread(tree, measures or session.subject())
+        tree, start, words = fit_session_shape(
+            session, tree, settings, start, first, progress, height_spread=spread
+        )
         notes = (*notes, *([words] if words else []))
     record = RunRecord(
         name=name or free_run_name(session),

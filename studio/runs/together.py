@@ -17,6 +17,7 @@ import numpy as np
 
 from studio.body.branches import within_limits
 from studio.body.scale import scale_of
+from studio.body.subject import height_spread
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.errors import RunError
@@ -159,8 +160,9 @@ class _Work:
                 seen.append(self._evidence(frame, self._seeing(frame), part))
             if any(len(one.views) < len(self._cameras) for one in seen):
                 continue
+            rows_there = np.searchsorted(frames, chosen)
             shape = fitted_shape(
-                body.body, self._cameras, seen, poses[number][np.searchsorted(frames, chosen)]
+                body.body, self._cameras, seen, poses[number][rows_there], height_spread=body.height_spread
             )
             if shape.overlap[1] >= max(LEAST_OVERLAP, shape.overlap[0]):
                 body.body = shape.body
@@ -199,6 +201,7 @@ class _Body:
 
     def __init__(self, session: Session, first: int, progress: Progress) -> None:
         self.body, self._cameras = session.body(), session.cameras()
+        self.height_spread = height_spread(self.body, session.subject())
         evidence = session_settings(session).evidence
         self._settings = dataclasses.replace(default_settings(TRACKER, WEIGHTING), evidence=evidence)
         start = session.start_pose(self.body)

@@ -13,6 +13,7 @@ from studio.body.subject import (
     Subject,
     enlarged,
     fit_subject,
+    height_spread,
     in_lengths,
     read_subject,
     subject_from_shape,
@@ -317,3 +318,20 @@ def test_a_shape_of_another_length_or_body_is_refused(human31: BodyModel) -> Non
         subject_from_shape(human31, np.ones(57))
     with pytest.raises(BodyError, match="'planar_arm4'"):
         subject_from_shape(load_body("planar_arm4"), np.ones(58))
+
+
+@pytest.mark.parametrize(
+    ("body", "subject", "spread"),
+    [
+        ("human35", Subject(height_mm=1700.0), 15.0),
+        ("human35", Subject(), 90.0),
+        ("human35", None, 90.0),
+        ("human35", Subject(height_mm=1700.0, lengths_mm={"RHip_RKnee": 400.0}), None),
+        ("human35", Subject(dimensions_mm={"left_thigh_length": 400.0}), None),
+        ("mouse31", None, None),
+    ],
+)
+def test_a_height_may_be_off_where_no_length_was_measured(
+    body: str, subject: Subject | None, spread: float | None
+) -> None:
+    assert height_spread(load_body(body), subject) == (spread and pytest.approx(spread, rel=0.02))

@@ -11,13 +11,14 @@ from moving_bodies import standing
 
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
+from studio.body.model import BodyModel
 from studio.body.shape_space import dimension_kinds, untaped_lengths
-from studio.body.subject import Subject, fit_subject
+from studio.body.subject import REPORTED_SPREAD, Subject, fit_subject
 from studio.evidence.settings import EvidenceSettings
 from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma
 from studio.runs.setup import shape_on_the_way
-from studio.runs.setup.shape_on_the_way import FOLDER, shaped_body
+from studio.runs.setup.shape_on_the_way import FOLDER, GUESSED, MEASURED, FittedShape, shaped_body
 from studio.runs.setup.workflow import run_changes
 from studio.search.settings import default_settings
 from studio.sessions.run_record import RunRecord
@@ -34,12 +35,8 @@ def walk(tmp_path: Path) -> Session:
     return Session(tmp_path / "walk")
 
 
-def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
-    body, _ = fit_subject(load_body("human31"), Subject(height_mm=1760.0))
-    assert body.definition is not None
-    kinds = dimension_kinds(body.definition)
-    radii = [name for name, kind in kinds.items() if kind == "radius" and ("arm" in name or "shin" in name)]
-    stout = with_dimensions(body, {name: 1.3 * body.dimensions[name] for name in radii})
+def shaped(body: BodyModel, true: BodyModel, height_spread: float | None = None) -> FittedShape:
+    """The shape of a body in footage of another one that moves a leg and an arm."""
     names = [entry.name for entry in body.parameters]
     pose = standing(body, left_shoulder_rx=0.6, right_shoulder_rx=-0.6)
 
@@ -49,14 +46,41 @@ def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
         moved[names.index("right_elbow_ry")] -= 0.05 * frame
         return moved
 
-    found = shaped_body(
+    return shaped_body(
         body,
         CAMERAS,
-        lambda frame: drawn_evidence(stout, posture(frame), CAMERAS, frame),
+        lambda frame: drawn_evidence(true, posture(frame), CAMERAS, frame),
         range(8),
         posture(0),
         default_sigma(body, 30.0),
+        height_spread=height_spread,
     )
+
+
+def test_lengths_that_were_guessed_of_a_height_are_fitted() -> None:
+    """Longer legs under a shorter trunk: measured lengths stay as they are, guessed ones come near."""
+    body, _ = fit_subject(load_body("human31"), Subject(height_mm=1760.0))
+    legs = [f"{side}_{part}_length" for side in ("left", "right") for part in ("thigh", "shin")]
+    true = with_dimensions(body, {name: 1.06 * body.dimensions[name] for name in legs})
+    true = with_dimensions(true, {"torso_length": 0.92 * body.dimensions["torso_length"]})
+
+    def off(found: BodyModel) -> float:
+        return float(
+            np.mean([abs(found.dimensions[name] - true.dimensions[name]) for name in (*legs, "torso_length")])
+        )
+
+    kept, fitted = (shaped(body, true, spread).body for spread in (None, REPORTED_SPREAD))
+    assert off(kept) == off(body)
+    assert off(fitted) < 0.5 * off(body)
+
+
+def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
+    body, _ = fit_subject(load_body("human31"), Subject(height_mm=1760.0))
+    assert body.definition is not None
+    kinds = dimension_kinds(body.definition)
+    radii = [name for name, kind in kinds.items() if kind == "radius" and ("arm" in name or "shin" in name)]
+    stout = with_dimensions(body, {name: 1.3 * body.dimensions[name] for name in radii})
+    found = shaped(body, stout)
     lengths = {name for name, kind in kinds.items() if kind == "length"} - untaped_lengths(body)
     assert all(found.body.dimensions[name] == body.dimensions[name] for name in lengths)
     ratios = [found.body.dimensions[name] / body.dimensions[name] for name in radii]
@@ -80,6 +104,14 @@ def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
     assert plain.dimensions == dict(own)
     assert (first.subject_dimensions, plain.subject_dimensions) == (dict(own), {})
     assert run_changes(walk, walk.run(first.name)) == []
+    assert first.notes[-1].endswith(MEASURED)
+
+
+@pytest.mark.slow
+def test_a_run_of_which_only_a_height_is_known_fits_the_lengths(walk: Session) -> None:
+    height = prepare_run(walk, last=12, subject=Subject(body="human31", height_mm=1760.0)).record
+    assert height.notes[-1].endswith(GUESSED)
+    assert height.dimensions["left_thigh_length"] != height.subject_dimensions["left_thigh_length"]
 
 
 @pytest.fixture
@@ -127,7 +159,7 @@ def test_a_fit_with_the_masks_of_another_default_is_not_taken(
     for defaults in (EvidenceSettings(), EvidenceSettings(mask_shadow_darkest=0.6)):
         monkeypatch.setattr(shape_on_the_way, "EvidenceSettings", lambda kept=defaults: kept)
         settings = dataclasses.replace(default_settings(), evidence=defaults)
-        keys.append(shape_on_the_way._key(walk, walk.body(), settings, start, range(30)))
+        keys.append(shape_on_the_way._key(walk, walk.body(), settings, start, range(30), None))
     assert keys[0] != keys[1]
 
 

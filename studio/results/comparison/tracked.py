@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.motion_files.trc import read_trc
-from studio.body.subject import Subject, enlarged, read_subject
+from studio.body.subject import Subject, enlarged, height_spread, read_subject
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
 from studio.foundations.errors import NotFoundError, TruthError
@@ -186,7 +186,10 @@ def track_seeds(
         sigma, first = session_sigma(session, body, rate), frames[: trial.shape_frames]
         of_shape = partial(evidence, name=WEIGHTING)
         on_floor = settings.refinement.above_floor
-        shaped = shaped_body(body, seen_with, of_shape, first, np.array(start), sigma, above_floor=on_floor)
+        shaped = shaped_body(
+            body, seen_with, of_shape, first, np.array(start), sigma, above_floor=on_floor,
+            height_spread=height_spread(body, subject or session.subject()),
+        )  # fmt: skip
         body, start = shaped.body, tuple(float(value) for value in shaped.start)
     sigma = session_sigma(session, body, rate) * trial.sigma_scale
     space = search_space(body, sigma, _behaviour(session, body, settings, trial))

@@ -3,8 +3,9 @@
 Cones too thin or too thick for the clothed body shift the joints (arms ride up by centimetres), and the silhouettes
 give the ends of hands, feet and head. So before a run begins, its first frames are tracked, the shape is fitted
 to the most different of them (`search.trackers.shape_refinement`), and the run begins again with it. Other lengths are
-kept: a fit of all of them is unsafe, as silhouettes hardly separate a knee ten millimetres higher from one that is
-bent a little more (`subject_fitting` does that with more frames and priors).
+kept where they were measured: silhouettes hardly separate a knee ten millimetres higher from one that is bent a little
+more. Guessed from a height they are farther off than that, and are fitted as well, with published proportions as prior
+(`subject_fitting` does that with more frames).
 
 The frames are tracked with the default tracker and seed 0 whatever the run has, so that all runs of a session have one
 body; it is kept in the session's folder `shapes` until footage, calibration, masks, subject or start pose change.
@@ -39,7 +40,7 @@ from studio.search.likelihood.shape_silhouettes import ShapePrograms
 from studio.search.settings import RunSettings, default_settings
 from studio.search.trackers.frame_refinement import FrameRefiner
 from studio.search.trackers.loss_detection import Onlooker, anything_seen
-from studio.search.trackers.shape_prior import ShapePrior, ShapeSpreads
+from studio.search.trackers.shape_prior import ShapePrior, ShapeSpreads, height_of
 from studio.search.trackers.shape_refinement import ShapeRefiner
 from studio.search.trackers.tracker import start_of
 from studio.sessions.provenance import digests
@@ -56,6 +57,13 @@ FEWEST_CAMERAS = 2
 LEAST_OVERLAP = 0.6
 """Masks that agree less with the body, even with the shape, show something else."""
 STEP = "fitting the shape"
+MEASURED = "Lengths that a tape measures were kept."
+GUESSED = (
+    "No limb was measured: all lengths were fitted; 'studio fit-subject' takes frames from the whole footage."
+)
+RULES = 2
+"""Counts the changes of how a shape is fitted, so that one of before is not taken: 2, feet that cannot bend are left in
+the floor."""
 SCHEMA_VERSION, FOLDER = 1, "shapes"
 WORDED = 5.0
 """mm (of a person: `scale_of`): smaller changes are not reported."""
@@ -96,21 +104,23 @@ def fit_session_shape(
     start: Array,
     first: int,
     progress: Progress = no_progress,
+    *,
+    height_spread: float | None = None,
 ) -> tuple[BodyModel, Array, str]:
     """The body with the shape of a session's frames from `first` on, its pose there (D,), and a text for the notes.
 
-    settings : whose evidence is used. The unchanged body and "", if it has no radii to fit or there are too few frames
-    or cameras.
+    settings : whose evidence is used. height_spread : as in `fitted_shape`. The unchanged body and "", if it has no
+    radii to fit or there are too few frames or cameras.
     """
     frames = range(first, min(session.manifest.frame_count, first + FIRST_FRAMES))
     few = len(frames) < FEWEST_FRAMES or len(session.cameras()) < FEWEST_CAMERAS
     if few or not can_be_fitted(body):
         return body, start, ""
-    path = session.path / FOLDER / f"{_key(session, body, settings, start, frames)}.json"
+    path = session.path / FOLDER / f"{_key(session, body, settings, start, frames, height_spread)}.json"
     try:
         kept = _RECORD.read(path)
     except (NotFoundError, SessionError):
-        kept = _fitted_now(session, body, settings, start, frames, progress)
+        kept = _fitted_now(session, body, settings, start, frames, progress, height_spread)
         path.parent.mkdir(exist_ok=True)
         _RECORD.write(path, kept)
     if not kept.dimensions:
@@ -123,7 +133,13 @@ def can_be_fitted(body: BodyModel) -> bool:
 
 
 def _fitted_now(
-    session: Session, body: BodyModel, settings: RunSettings, start: Array, frames: range, progress: Progress
+    session: Session,
+    body: BodyModel,
+    settings: RunSettings,
+    start: Array,
+    frames: range,
+    progress: Progress,
+    height_spread: float | None,
 ) -> _Kept:
     with closing(ProblemSource(session, body)) as problems:
         wanted = _judging(settings)
@@ -139,6 +155,7 @@ def _fitted_now(
             start,
             session_sigma(session, body, fps),
             above_floor=settings.refinement.above_floor,
+            height_spread=height_spread,
             progress=progress,
         )
     before, after = shape.overlap
@@ -147,7 +164,7 @@ def _fitted_now(
     return _Kept(
         dimensions=dict(shape.body.dimensions),
         start=tuple(float(value) for value in shape.start),
-        words=_words(shape, frames),
+        words=_words(shape, frames, height_spread is None),
     )
 
 
@@ -160,10 +177,12 @@ def shaped_body(
     sigma: Array,
     *,
     above_floor: bool = True,
+    height_spread: float | None = None,
     progress: Progress = no_progress,
 ) -> FittedShape:
     """The shape of a body in the first frames. evidence : of a frame, with edge proximity maps. start : (D,) of
-    the first of `frames`. sigma : (D,) σ0 from frame to frame. above_floor : as in `ShapeRefiner`.
+    the first of `frames`. sigma : (D,) σ0 from frame to frame. above_floor : as in `ShapeRefiner`. height_spread : as
+    in `fitted_shape`.
     """
     usual = default_settings(TRACKER, WEIGHTING)
     rules = dataclasses.replace(
@@ -185,7 +204,8 @@ def shaped_body(
     numbers = np.array(frames[: len(followed)])
     chosen = varied_frames(body, numbers, followed, FITTED_FRAMES)
     rows = np.searchsorted(numbers, chosen)
-    fit = fitted_shape(body, cameras, [evidence(frame) for frame in chosen], followed[rows], above_floor)
+    seen_there = [evidence(frame) for frame in chosen]
+    fit = fitted_shape(body, cameras, seen_there, followed[rows], above_floor, height_spread)
     progress(STEP, len(frames) + 1, len(frames) + 1)
     return FittedShape(fit.body, followed[0], fit.sizes, fit.overlap)
 
@@ -196,15 +216,23 @@ def fitted_shape(
     frames: Sequence[FrameEvidence],
     poses: Array,
     above_floor: bool = True,
+    height_spread: float | None = None,
 ) -> FittedShape:
     """The shape of a body on some frames' masks, from its poses there (F, D), which are in the right valley.
-    above_floor : as in `ShapeRefiner`.
+
+    above_floor : as in `ShapeRefiner`. height_spread : mm by which the body's height may be off, of which its lengths
+    were guessed; None: they were measured, and only those that no tape measures are fitted.
     """
-    space = shape_space(body, lengths="untaped", flesh=True)
-    prior = ShapePrior(space, ShapeSpreads(), None)
+    guessed = height_spread is not None
+    space = shape_space(body, lengths=guessed or "untaped", flesh=True)
+    prior = (
+        ShapePrior(space, ShapeSpreads(height=height_spread), height_of(space)[0])
+        if guessed
+        else ShapePrior(space, ShapeSpreads(), None)
+    )
     borders = [silhouette_distances(frame) for frame in frames]
     refiner = ShapeRefiner(
-        ShapePrograms(space), cameras, borders, prior, lengths_known=True, above_floor=above_floor
+        ShapePrograms(space), cameras, borders, prior, lengths_known=not guessed, above_floor=above_floor
     )
     fit = refiner.refine(np.zeros(len(space.groups)), poses)
     shaped = space.body_of(fit.shape)
@@ -234,7 +262,7 @@ def _sizes(space: ShapeSpace, shape: Array) -> dict[ShapeGroup, tuple[float, flo
     }
 
 
-def _words(shape: FittedShape, frames: range) -> str:
+def _words(shape: FittedShape, frames: range, measured: bool) -> str:
     in_mm, without_unit = list[str](), list[str]()
     for group, (one, other) in shape.sizes.items():
         words = group.name.replace("_", " ")
@@ -247,18 +275,26 @@ def _words(shape: FittedShape, frames: range) -> str:
     listed = f": {', '.join(changed)}" if changed else ""
     return (
         f"The body's shape was fitted to frames {frames[0]} to {frames[-1]}{listed}; the silhouettes agree by "
-        f"{100.0 * shape.overlap[1]:.0f} % (before: {100.0 * shape.overlap[0]:.0f} %). Lengths that a tape"
-        " measures were kept."
+        f"{100.0 * shape.overlap[1]:.0f} % (before: {100.0 * shape.overlap[0]:.0f} %)."
+        f" {MEASURED if measured else GUESSED}"
     )
 
 
-def _key(session: Session, body: BodyModel, settings: RunSettings, start: Array, frames: range) -> str:
+def _key(
+    session: Session,
+    body: BodyModel,
+    settings: RunSettings,
+    start: Array,
+    frames: range,
+    height_spread: float | None,
+) -> str:
     """A digest of all that the fit depends on: of the evidence the masks' knobs, whose defaults may change, and others
     that are not at their defaults. Sizes and start pose are rounded: their last bits are a processor's own.
     """
     evidence, usual = msgspec.to_builtins(settings.evidence), msgspec.to_builtins(EvidenceSettings())
     made_of = (
-        SCHEMA_VERSION,
+        RULES,
+        height_spread,
         digests(session, ("footage", "calibration", "masks")),
         body.name,
         {name: round(value, KEY_DIGITS) for name, value in body.dimensions.items()},

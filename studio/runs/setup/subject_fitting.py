@@ -20,7 +20,7 @@ from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.shape_space import Kind, ShapeSpace, levelled, shape_space
-from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject, fit_subject, write_subject
+from studio.body.subject import REPORTED_SPREAD, SHORTEST_MM, TALLEST_MM, Subject, fit_subject, write_subject
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
@@ -78,7 +78,7 @@ class FitRequest:
     height_spread: Annotated[
         float,
         Field(ge=0, description="How far off the height may be, mm: 15 for a measured one, 60 for a guess."),
-    ] = 15.0
+    ] = REPORTED_SPREAD
     run: Annotated[
         str, Field(description="Whose poses to begin with; default: the newest."), Terminal(metavar="RUN")
     ] = ""

@@ -45,10 +45,23 @@ def test_an_upright_cone_ends_at_its_axis_and_a_lying_one_a_radius_below() -> No
 
 def test_the_pull_is_robust_and_twenty_times_the_square_of_small_depths() -> None:
     slopes = np.ones((1, 1))
-    assert pull_of(np.array([-1.0]), slopes).loss == pytest.approx(20.0, rel=1e-3)
-    assert pull_of(np.array([-1.0]), slopes).gradient == pytest.approx([-20.0], rel=1e-3)
-    assert pull_of(np.array([-1e5]), slopes).loss == pytest.approx(20.0 * 100.0**2, rel=1e-3)
-    assert abs(pull_of(np.array([-1000.0]), slopes).gradient[0]) < 3.0
+    assert pull_of(np.array([-1.0]), slopes).loss == pytest.approx(20.0, rel=2e-3)
+    assert pull_of(np.array([-1.0]), slopes).gradient == pytest.approx([-20.0], rel=3e-3)
+    assert pull_of(np.array([-1e5]), slopes).loss == pytest.approx(20.0 * 30.0**2, rel=1e-3)
+    assert abs(pull_of(np.array([-300.0]), slopes).gradient[0]) < 1.0
+
+
+def test_where_the_floor_is_elsewhere_nothing_is_pulled() -> None:
+    """One foot lies far below z = 0, and the other one, in the air, just below it."""
+    hold, names = FloorHold(BODY, UNIT, STEP), [limb.name for limb in BODY.drawn]
+    pose = sunk(200.0, left_knee=1.2)
+    heights = Heights(BODY, 1.0).of(pose[None])[0].reshape(-1, 2)
+    pose[2] -= heights[names.index("left foot")].min() + 20.0
+    low = Heights(BODY, 1.0).of(pose[None])[0].reshape(-1, 2)
+    assert low[names.index("left foot")].min() == pytest.approx(-20.0, abs=1.0)
+    assert low[names.index("right foot")].min() < -100.0
+    assert hold.of(pose) is None
+    assert hold.of(sunk(20.0)) is not None
 
 
 @pytest.mark.parametrize("depth", [5.0, 60.0])
