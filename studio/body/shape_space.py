@@ -155,6 +155,16 @@ def untaped_lengths(body: BodyModel) -> frozenset[str]:
     return frozenset(names)
 
 
+def keeps_taped(body: BodyModel, dimensions: Mapping[str, float]) -> bool:
+    """Whether dimensions of a body from a file leave its lengths that a tape measures as they are: a fit with measured
+    lengths does.
+    """
+    assert body.definition is not None
+    kinds, untaped = dimension_kinds(body.definition), untaped_lengths(body)
+    taped = [name for name, kind in kinds.items() if kind == "length" and name not in untaped]
+    return all(dimensions[name] == body.dimensions[name] for name in taped)
+
+
 def _spread(body: BodyModel, name: str, kind: Kind) -> float:
     """The spread of a dimension's group (`ShapeGroup`)."""
     spread = body.definition.dimensions[name].spread if body.definition else None

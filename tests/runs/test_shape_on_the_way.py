@@ -12,7 +12,7 @@ from moving_bodies import standing
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
-from studio.body.shape_space import dimension_kinds, untaped_lengths
+from studio.body.shape_space import dimension_kinds, keeps_taped, untaped_lengths
 from studio.body.subject import REPORTED_SPREAD, Subject, fit_subject
 from studio.evidence.settings import EvidenceSettings
 from studio.runs.new_run import prepare_run
@@ -71,6 +71,8 @@ def test_lengths_that_were_guessed_of_a_height_are_fitted() -> None:
 
     kept, fitted = (shaped(body, true, spread).body for spread in (None, REPORTED_SPREAD))
     assert off(kept) == off(body)
+    assert keeps_taped(body, kept.dimensions)
+    assert not keeps_taped(body, fitted.dimensions)
     assert off(fitted) < 0.5 * off(body)
 
 

@@ -24,7 +24,7 @@ from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
 from studio.body.person import marker_motion
 from studio.body.scale import scale_of
-from studio.body.shape_space import dimension_kinds, untaped_lengths
+from studio.body.shape_space import keeps_taped
 from studio.body.subject import REPORTED_SPREAD
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
@@ -420,21 +420,13 @@ def _shaped(
         np.array(record.start_pose),
         np.array(record.sigma),
         above_floor=recorded.refinement.above_floor,
-        height_spread=None if _are_measured(body, record.dimensions) else REPORTED_SPREAD,
+        height_spread=None if keeps_taped(body, record.dimensions) else REPORTED_SPREAD,
         progress=lambda step, done, total: progress(f"{step} of the twin", done, total),
     )
     before, after = shape.overlap
     if after < max(LEAST_OVERLAP, before):
         return body, record.start_pose
     return shape.body, tuple(float(value) for value in shape.start)
-
-
-def _are_measured(body: BodyModel, fitted: Mapping[str, float]) -> bool:
-    """Whether a run's fit kept the lengths of its subject's body that a tape measures."""
-    assert body.definition is not None
-    kinds, untaped = dimension_kinds(body.definition), untaped_lengths(body)
-    taped = [name for name, kind in kinds.items() if kind == "length" and name not in untaped]
-    return all(fitted[name] == body.dimensions[name] for name in taped)
 
 
 def track_to_end(run: StoredRun, problems: ProblemSource, step: Callable[[int, int], None]) -> None:

@@ -99,8 +99,8 @@ class Distances(Protocol):
 
 
 FLOOR_HELP = (
-    "Pull what of a body that is sized by its height (a person, a dog) lies below the floor, z = 0, back up. Off where"
-    " the floor is elsewhere, or for who swims."
+    "Pull what of a body that is sized by its height (a person, a dog) lies a little below the floor, z = 0, back up."
+    " Off for who swims or climbs down."
 )
 Equations = tuple[float, Array, Array]
 """A loss, and the gradient (D,) and matrix (D, D) of half of it per unit of each parameter."""
