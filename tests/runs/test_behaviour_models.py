@@ -242,4 +242,4 @@ def test_experiments_track_with_a_model(long_session: Session) -> None:
     run = made(long_session, "behaviour", **LEARNING)
     poses = tracked(long_session, run)
     own = marker_points(body, poses)
-    assert found.per_frame_mm == pytest.approx(np.linalg.norm(own - truth, axis=2).mean(axis=1), abs=2e-3)
+    assert found.per_frame_mm == pytest.approx(np.linalg.norm(own - truth, axis=2).mean(axis=1), abs=5e-3)
