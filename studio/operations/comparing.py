@@ -242,7 +242,7 @@ class SweepRequest:
     ] = None
     fit_shape: Annotated[
         bool,
-        Field(description="Each run begins with the radii, hands, feet and head that its first frames show."),
+        Field(description="Each run begins with the shape that its first frames show."),
         Terminal("--fit-shape/--keep-shape"),
     ] = True
     allow_inconsistent: AllowInconsistent = False

@@ -3,7 +3,7 @@
 `TrackingRun.step_layer` (`tracking_run.py`) does a layer, which batches and the tracking process repeat;
 `problem_source.py` makes pictures, masks and maps of each frame ready, `frame_loop.FrameSearch` searches it,
 `FrameRefiner` puts the pose onto the silhouettes and draws limbs again that they deny, `RunWatch` says how the frame
-stands. When a run is made, the body's radii, hands, feet and head are fitted to what its first thirty frames show
+stands. When a run is made, the body's shape is fitted to what its first thirty frames show
 (`setup/shape_on_the_way.py`); after its last frame exchanged sides are corrected in a track beside what was tracked
 (`sides.py`). Where a kernel has to be compiled, another process
 compiles what follows the first layer (`compiling_beside.py`).

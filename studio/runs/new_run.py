@@ -123,8 +123,8 @@ def prepare_run(
     fit_shape: Annotated[
         bool,
         Field(
-            description="Begin with the radii, hands, feet and head that the first frames show; bone lengths are kept."
-            " Not live."
+            description="Begin with the radii, hands, feet and head that the first frames show, and with bone lengths"
+            " where none was measured. Not live."
         ),
         Terminal("--fit-shape/--keep-shape"),
     ] = True,

@@ -140,8 +140,8 @@ class _Work:
         progress("", len(frames), len(frames))
 
     def fit(self) -> None:
-        """Fit each body's radii, hands, feet and head in frames in which the others hide it least, as a run does in its
-        first ones (`shape_on_the_way`).
+        """Fit each body's shape in frames in which the others hide it least, as a run does in its first ones
+        (`shape_on_the_way`).
         """
         frames = np.array(sorted(self._shared_pixels))
         if len(frames) < FEWEST_FRAMES or len(self._cameras) < FEWEST_CAMERAS:
