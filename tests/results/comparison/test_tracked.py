@@ -58,7 +58,7 @@ def test_an_attempt_is_measured_and_gives_the_same_again(cache) -> None:
 
 def test_the_bundled_walk_is_tracked_by_the_default_as_well_as_ever(cache) -> None:
     """9.9 mm over 60 frames; pulled out of the floor by feet that cannot bend it was at 24.9."""
-    wanted = {"last": 24, "shape_frames": 24, "changes": {}}
+    wanted = {"last": 24, "shape_frames": 24, "changes": {"refine_frames": True}}
     found = track(replace(attempt(**wanted), tracker=DEFAULT_TRACKER, weighting=DEFAULT_WEIGHTING), cache)
     assert found.mean_mm < 13.0
     assert found.worst_mm < 18.0
