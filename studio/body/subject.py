@@ -34,7 +34,7 @@ import numpy as np
 import tomli_w
 from numpy.typing import ArrayLike
 
-from studio.body.catalogue import load_body
+from studio.body.catalogue import load_body, packaged_bodies
 from studio.body.dimensions import follows_height, with_dimensions
 from studio.body.marker_distances import MarkerDistances
 from studio.body.model import BodyModel
@@ -160,14 +160,17 @@ def fit_subject(
 
 
 def height_spread(body: BodyModel, subject: Subject | None) -> float | None:
-    """mm by which the height may be off, of which alone a body's lengths were guessed; None where any was measured, or
-    where they are no shares of a height.
+    """mm by which the height may be off, of which alone a body's lengths were guessed; None where any was measured,
+    where they are no shares of a height, or where somebody's own body file says them.
 
     subject : whose body it is; None where nothing is known.
     """
     if not follows_height(body) or (subject is not None and (subject.lengths_mm or subject.dimensions_mm)):
         return None
-    return REPORTED_SPREAD if subject is not None and subject.height_mm else UNKNOWN_SPREAD * scale_of(body)
+    if subject is not None and subject.height_mm:
+        return REPORTED_SPREAD
+    usual = body.name in packaged_bodies() and load_body(body.name).dimensions == body.dimensions
+    return UNKNOWN_SPREAD * scale_of(body) if usual else None
 
 
 def in_lengths(subject: Subject, own_body: BodyModel) -> Subject:
