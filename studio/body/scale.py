@@ -24,6 +24,11 @@ def scale_of(body: BodyModel) -> float:
     return 2.0 ** round(octaves) if abs(octaves) >= 1.0 else 1.0
 
 
+def rest_height(body: BodyModel) -> float:
+    """mm above the floor of the highest end of a limb's axis of a body at rest."""
+    return float(limb_ends(body, body.neutral)[0, ..., 2].max())
+
+
 def longest_side(body: BodyModel) -> float:
     """mm along x, y or z from end to end of the limbs' axes of a body at rest; 0 for a body without limbs."""
     if not body.drawn:

@@ -161,7 +161,7 @@ def fit_subject(
 
 def height_spread(body: BodyModel, subject: Subject | None) -> float | None:
     """mm by which the height may be off, of which alone a body's lengths were guessed; None where any was measured,
-    where they are no shares of a height, or where somebody's own body file says them.
+    where they are no shares of a height, or where a user's own body file says them.
 
     subject : whose body it is; None where nothing is known.
     """

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from studio.evidence.volume.hull_projection import distorted
 from studio.foundations.arrays import Array
+from studio.foundations.geometry.camera import Camera
 from studio.foundations.numba_in_threads import EXACT, njit
 
 CELLS = 320
@@ -17,6 +18,12 @@ CELLS = 320
 def cell_size(height: int, width: int) -> int:
     """Pixels along the side of a picture's cells."""
     return max(1, -(-max(height, width) // CELLS))
+
+
+def numbers_of(camera: Camera) -> Array:
+    """(23,) a camera's numbers as `cell_at` reads them."""
+    parts = camera.matrix[:2].ravel(), camera.distortion, camera.rotation.ravel(), camera.translation
+    return np.concatenate(parts)
 
 
 @njit(**EXACT)

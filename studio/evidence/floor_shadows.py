@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.evidence.cells import cell_at, cell_size
+from studio.evidence.cells import cell_at, cell_size, numbers_of
 from studio.foundations.arrays import Array, Bytes, Floats
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.numba_in_threads import EXACT, njit
@@ -139,20 +139,7 @@ class FloorShadows:
 
     def __init__(self, cameras: Sequence[Camera]) -> None:
         self._cameras = tuple(cameras)
-        self._views = np.array(
-            [
-                np.concatenate(
-                    [
-                        camera.matrix[:2].ravel(),
-                        camera.distortion,
-                        camera.rotation.ravel(),
-                        camera.translation,
-                        camera.centre,
-                    ]
-                )
-                for camera in cameras
-            ]
-        )
+        self._views = np.array([(*numbers_of(camera), *camera.centre) for camera in cameras])
         centres = np.array([camera.centre for camera in cameras])
         self._middle, self._distance = _middle_seen(
             centres, np.array([camera.rotation[2] for camera in cameras])

@@ -337,7 +337,7 @@ def test_a_height_may_be_off_where_no_length_was_measured(
     assert height_spread(load_body(body), subject) == (spread and pytest.approx(spread, rel=0.02))
 
 
-def test_lengths_of_somebodys_own_body_are_no_guess() -> None:
+def test_lengths_of_a_users_own_body_are_no_guess() -> None:
     own = with_dimensions(load_body("human35"), {"left_thigh_length": 410.0})
     assert height_spread(own, None) is None
     assert height_spread(own, Subject(height_mm=1700.0)) == 15.0

@@ -22,7 +22,7 @@ import numpy as np
 
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
-from studio.body.scale import scale_of
+from studio.body.scale import rest_height, scale_of
 from studio.body.shape_space import ShapeGroup, ShapeSpace, dimension_kinds, shape_space, untaped_lengths
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
@@ -40,7 +40,7 @@ from studio.search.likelihood.shape_silhouettes import ShapePrograms
 from studio.search.settings import RunSettings, default_settings
 from studio.search.trackers.frame_refinement import FrameRefiner
 from studio.search.trackers.loss_detection import Onlooker, anything_seen
-from studio.search.trackers.shape_prior import ShapePrior, ShapeSpreads, height_of
+from studio.search.trackers.shape_prior import ShapePrior, ShapeSpreads
 from studio.search.trackers.shape_refinement import ShapeRefiner
 from studio.search.trackers.tracker import start_of
 from studio.sessions.provenance import digests
@@ -226,7 +226,7 @@ def fitted_shape(
     guessed = height_spread is not None
     space = shape_space(body, lengths=guessed or "untaped", flesh=True)
     prior = (
-        ShapePrior(space, ShapeSpreads(height=height_spread), height_of(space)[0])
+        ShapePrior(space, ShapeSpreads(height=height_spread), rest_height(body))
         if guessed
         else ShapePrior(space, ShapeSpreads(), None)
     )

@@ -9,9 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-import numpy as np
-
-from studio.body.forward_kinematics import limb_ends
+from studio.body.scale import longest_side, rest_height
 from studio.footage.calibration.checks import check_calibration
 from studio.footage.calibration.rig_checks import NO_FLOOR, TILTED, UNIT, room_findings
 from studio.foundations.errors import StudioError
@@ -166,8 +164,7 @@ def _what_to_look_at(session: Session) -> str:
 
 def _standing_mm(session: Session) -> float:
     """The standing height of the session's body."""
-    body = session.body()
-    return float(limb_ends(body, body.neutral)[0, ..., 2].max())
+    return rest_height(session.body())
 
 
 def _size_mm(session: Session) -> float:
@@ -176,7 +173,7 @@ def _size_mm(session: Session) -> float:
         body = session.body()
     except StudioError:
         return 0.0
-    return float(np.ptp(limb_ends(body, body.neutral)[0].reshape(-1, 3), axis=0).max())
+    return longest_side(body)
 
 
 def subject_step(session: Session) -> StepStatus:

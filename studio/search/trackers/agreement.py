@@ -157,10 +157,11 @@ class Agreement:
         else:
             bare = _bare_points(off.corners, silhouettes, steps, far)
         there = reach.limbs_there(pose, self.cameras, silhouettes, [own for own, _ in bare], off.mm)
-        groups, found = np.array([reach.limbs.index(limb) for limb in self._limbs]), np.zeros(off.bare.shape)
-        for own, (_, limbs), allowed, step, mm in zip(found, bare, there, steps, off.mm, strict=True):
+        groups = np.array([reach.limbs.index(limb) for limb in self._limbs])
+        bare_there = np.zeros(off.bare.shape)
+        for own, (_, limbs), allowed, step, mm in zip(bare_there, bare, there, steps, off.mm, strict=True):
             np.add.at(own, limbs[allowed[np.arange(len(limbs)), groups[limbs]]], (step * mm) ** 2)
-        return replace(off, bare=np.minimum(off.bare, found))
+        return replace(off, bare=np.minimum(off.bare, bare_there))
 
     def _within(
         self, pose: Array, bare: Sequence[Array], steps: Sequence[int], sizes: Sequence[float]

@@ -127,14 +127,15 @@ class FloorHoldOfShapes:
         here = Heights(self._space.body_of(shape), self._scale)
         heights = here.of(poses)
         pulls: list[Pull | None] = [None] * len(poses)
-        low = np.flatnonzero(is_pulled(heights).any(axis=1))
+        pulled = is_pulled(heights)
+        low = np.flatnonzero(pulled.any(axis=1))
         if not len(low):
             return pulls
         first = self._heights.of(poses[low])
         by_size = np.array([(other.of(poses[low]) - first) / STEP for other in self._larger])
         by_shape = np.tensordot(self._sizes_by_shape(shape), by_size, 1)
         for number, pose in enumerate(low.tolist()):
-            ends = np.flatnonzero(is_pulled(heights[pose]))
+            ends = np.flatnonzero(pulled[pose])
             by_pose = here.slopes(poses[pose], self._unit, self._step)
             slopes = np.concatenate([by_pose[:, ends], by_shape[:, number, ends]])
             pulls[pose] = pull_of(heights[pose, ends], slopes)

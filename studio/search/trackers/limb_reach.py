@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.model import BodyModel, moving_joint
 from studio.body.scale import scale_of
-from studio.evidence.cells import cell_at
+from studio.evidence.cells import cell_at, numbers_of
 from studio.foundations.arrays import Array, Bytes, Floats
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import directions
@@ -112,15 +112,14 @@ class LimbReach:
             begin += silhouette.signed.size
         signed = np.concatenate([silhouette.signed.ravel() for silhouette in silhouettes])
         views, near = np.array([numbers_of(camera) for camera in cameras]), NEAR_MM / np.array(mm)
+        seen = signed, corners, maps, views, near
         placed, step = self.placed(pose), STEP_MM * scale_of(self._body)
         found = list[NDArray[np.bool_]]()
         for view, (camera, own) in enumerate(zip(cameras, pixels, strict=True)):
             there = np.zeros((len(own), len(self.limbs)), np.bool_)
-            eye, rays = -camera.rotation.T @ camera.translation, directions(camera, own) @ camera.rotation
+            rays = directions(camera, own) @ camera.rotation
             rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-            fill_limbs_there(
-                signed, corners, maps, views, near, view, eye, rays, *placed, step, LEAST_AGREEING, there
-            )
+            fill_limbs_there(*seen, view, camera.centre, rays, *placed, step, LEAST_AGREEING, there)
             there[:, ~self.moves] = np.any(there, axis=1, keepdims=True)
             found.append(there)
         return found
@@ -130,12 +129,6 @@ class LimbReach:
 def limb_reach_of(body: BodyModel, names: tuple[str, ...]) -> LimbReach:
     """The reach of a body's limbs, kept: it takes half a second. names : (L,) limb that each drawn one belongs to."""
     return LimbReach(body, names)
-
-
-def numbers_of(camera: Camera) -> Array:
-    """(23,) as of `cell_at`."""
-    parts = camera.matrix[:2].ravel(), camera.distortion, camera.rotation.ravel(), camera.translation
-    return np.concatenate(parts)
 
 
 def _hung_from(body: BodyModel, names: Sequence[str], limb: str) -> int:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, Limb
 from studio.body.scale import scale_of
-from studio.evidence.cells import cell_size
+from studio.evidence.cells import cell_size, numbers_of
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array, Bytes, Indices
 from studio.foundations.geometry.camera import Camera
@@ -43,7 +43,6 @@ from studio.search.trackers.limb_places import (
     places_left_bare,
     squares_of,
 )
-from studio.search.trackers.limb_reach import numbers_of
 from studio.search.trackers.tracker import HIDDEN
 
 SPACING = 35.0

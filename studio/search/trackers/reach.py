@@ -38,10 +38,9 @@ class Reach:
     def __init__(self, body: BodyModel) -> None:
         self._body = body
         self._root = next(number for number, joint in enumerate(body.joints) if joint.parent < 0)
-        rest, poses = drawn_within_limits(body)
-        frames = joint_frames(body, np.concatenate([rest[None], poses]))[:, self._root]
-        ends = limb_ends(body, np.concatenate([rest[None], poses]))
-        own = seen_from(frames, ends)
+        rest, drawn = drawn_within_limits(body)
+        poses = np.concatenate([rest[None], drawn])
+        own = seen_from(joint_frames(body, poses)[:, self._root], limb_ends(body, poses))
         moved = np.abs(own[1:] - own[:1]).max(axis=(0, 2, 3)) > 1e-6
         sizes = [thickness_of(limb) for limb in body.drawn]
         side = CUBE_MM * scale_of(body)

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studio.body.forward_kinematics import limb_ends
+from studio.body.scale import rest_height
 from studio.body.shape_space import OFFSET_SIGMA, ShapeSpace
+from studio.body.subject import REPORTED_SPREAD
 from studio.foundations.arrays import Array
 
 STEP = 1e-4
@@ -32,7 +33,7 @@ class ShapeSpreads:
     length: float = 0.06
     radius: float = 0.15
     size: float = 0.05
-    height: float = 15.0
+    height: float = REPORTED_SPREAD
 
 
 class ShapePrior:
@@ -92,8 +93,7 @@ def height_of(space: ShapeSpace) -> tuple[float, Array]:
     """The height of the rest pose (which stands on the floor), mm, and its slope (S,) over the shape."""
 
     def height(shape: Array) -> float:
-        body = space.body_of(shape)
-        return float(limb_ends(body, body.neutral)[0, ..., 2].max())
+        return rest_height(space.body_of(shape))
 
     size = len(space.groups)
     own = height(np.zeros(size))

@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 
 from studio.body.catalogue import body_file_text, load_body, packaged_bodies
-from studio.body.forward_kinematics import limb_ends
 from studio.body.motion_files.trc import MarkerMotion, read_trc, write_trc
 from studio.body.motion_files.truth_files import ANY_WORLD, read_truth
+from studio.body.scale import longest_side
 from studio.body.subject import DEFAULT_BODY, Subject, fit_subject, read_subject, write_subject
 from studio.footage.calibration.carried_points import carried
 from studio.footage.capture.calibration_files import (
@@ -87,8 +87,7 @@ def check_person(
         # Others are read by `carried_truth`, before anything is written: their times need the footage's rate.
         if path.suffix.lower() not in ANY_WORLD:
             read_trc(path)
-    size = float(np.ptp(limb_ends(fitted, fitted.neutral)[0].reshape(-1, 3), axis=0).max())
-    return CheckedPerson(body.name, names, notes, size)
+    return CheckedPerson(body.name, names, notes, longest_side(fitted))
 
 
 def _body_of(plan: SourcePlan, subject: Subject | None, usual: str, folders: tuple[Path, ...]) -> str:
