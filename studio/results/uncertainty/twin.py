@@ -25,7 +25,7 @@ from studio.body.model import BodyModel
 from studio.body.person import marker_motion
 from studio.body.scale import scale_of
 from studio.body.shape_space import keeps_taped
-from studio.body.subject import REPORTED_SPREAD
+from studio.body.subject import REPORTED_SPREAD, height_spread
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
 from studio.footage.capture.calibration_files import write_calibration
@@ -420,13 +420,21 @@ def _shaped(
         np.array(record.start_pose),
         np.array(record.sigma),
         above_floor=recorded.refinement.above_floor,
-        height_spread=None if keeps_taped(body, record.dimensions) else REPORTED_SPREAD,
+        height_spread=spread_of_fit(body, record.dimensions),
         progress=lambda step, done, total: progress(f"{step} of the twin", done, total),
     )
     before, after = shape.overlap
     if after < max(LEAST_OVERLAP, before):
         return body, record.start_pose
     return shape.body, tuple(float(value) for value in shape.start)
+
+
+def spread_of_fit(body: BodyModel, fitted: Mapping[str, float]) -> float | None:
+    """mm by which a body's height might be off when a run fitted its shape; None where its lengths were kept.
+
+    body : as it was before. fitted : its dimensions after, mm. At the size of its own file nothing was known of it.
+    """
+    return None if keeps_taped(body, fitted) else height_spread(body, None) or REPORTED_SPREAD
 
 
 def track_to_end(run: StoredRun, problems: ProblemSource, step: Callable[[int, int], None]) -> None:
