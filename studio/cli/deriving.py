@@ -13,6 +13,7 @@ from studio.foundations.declaring import (
     PROGRESS,
     REQUIRED,
     Knobs,
+    Millimetres,
     OneOf,
     Parameter,
     Target,
@@ -34,6 +35,20 @@ READERS: dict[Any, tuple[str, Callable[[Sequence[str], str], object]]] = {
 SET = "changes"
 
 Shown = Callable[..., Mapping[str, object]]
+
+
+class _LengthRange(click.FloatRange):
+    """A length in mm."""
+
+    def __init__(self, length: Millimetres) -> None:
+        super().__init__(length.least, length.most)
+        self._length = length
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ANN401
+        number = click.FLOAT.convert(value, param, ctx)
+        if not self._length.least <= number <= self._length.most:
+            self.fail(f"{self._length.refusal(number)}.", param, ctx)
+        return number
 
 
 class Call:
@@ -123,13 +138,12 @@ def _options(entry: Parameter) -> list[click.Parameter]:
         shown["help"] = f"{entry.help.removesuffix('.')}; again for more."
         return [click.Option([option, entry.name], multiple=True, metavar=metavar, **shown)]
     if Sequence[int] in alternatives(kind):
-        return [click.Option([option, entry.name], default="", metavar="A,B,…", **shown)]
-    default = entry.default if entry.default not in (None, "", REQUIRED) else None
-    given: dict[str, Any] = {
-        "default": default,
-        "show_default": default is not None,
-        "metavar": mark.metavar or None,
-    }
+        none: dict[str, Any] = {} if required else {"default": ""}
+        return [click.Option([option, entry.name], metavar="A,B,…", **none, **shown)]
+    given: dict[str, Any] = {"metavar": mark.metavar or None}
+    # Click takes any default, None too, for a value: an option that is required would never be missed.
+    if entry.default not in (None, "", REQUIRED):
+        given |= {"default": entry.default, "show_default": True}
     return [click.Option([option, entry.name], type=_click_type(entry, kind), **given, **shown)]
 
 
@@ -137,6 +151,9 @@ def _click_type(entry: Parameter, kind: Any) -> "click.ParamType[Any] | type":  
     members = entry.mark(OneOf)
     if members is not None:
         return MemberChoice(members.registry)
+    length = entry.mark(Millimetres)
+    if length is not None:
+        return _LengthRange(length)
     for one in alternatives(kind):
         if get_origin(one) is Literal:
             return click.Choice([word for word in get_args(one) if word])

@@ -139,11 +139,21 @@ def _has_own_masks(session: Session) -> bool:
 
 def _with_plates(session: Session, words: Sequence[str]) -> Session:
     """The session with CAMERA=FILE words, or the files of one folder, as pictures or clips of the empty room."""
-    if len(words) == 1 and (folder := Path(words[0])).is_dir():
+    folder = Path(words[0])
+    if len(words) == 1 and folder.is_dir():
         return give_plates(session, {}, [path for path in sorted(folder.iterdir()) if path.is_file()])
+    if len(words) == 1 and folder.is_file():
+        raise NotFoundError(f"'{folder}' is a file, and no camera is named.", f"Write CAMERA={folder}.")
+    if len(words) == 1 and "=" not in words[0]:
+        raise NotFoundError(
+            f"There is no folder '{folder}'.", "Give one that holds the plates, or CAMERA=FILE."
+        )
     parted = [word.partition("=") for word in words]
-    if any(not camera or not equals or not path for camera, equals, path in parted):
-        raise NotFoundError("The plates cannot be understood.", "Write CAMERA=FILE, or one folder.")
+    for word, (camera, _, path) in zip(words, parted, strict=True):
+        if not (camera and path):
+            raise NotFoundError(
+                f"'--plates {word}' cannot be understood.", "Write CAMERA=FILE, or one folder."
+            )
     return give_plates(session, {camera: Path(path) for camera, _, path in parted})
 
 

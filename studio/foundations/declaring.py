@@ -19,8 +19,10 @@ from typing import Annotated, Any, ParamSpec, TypeVar, Union, cast, get_args, ge
 import numpy as np
 from annotated_types import BaseMetadata, Ge, Gt, Le
 from numpy.typing import ArrayLike, NDArray
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, GetCoreSchemaHandler, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core.core_schema import ValidatorFunctionWrapHandler, no_info_wrap_validator_function
 
 from studio.foundations.errors import SettingsError
 from studio.foundations.knobs import Knob
@@ -97,6 +99,36 @@ class Knobs:
 
 
 @dataclass(frozen=True, slots=True)
+class Millimetres:
+    """The number is a length in mm, held to `least` and `most` by its Field: who gives another one is told the unit,
+    and which one was meant, it seems.
+    """
+
+    least: float
+    most: float
+
+    def refusal(self, value: float) -> str:
+        """Why a length outside the limits is refused, without a full stop."""
+        words = f"{value:g} mm is not from {self.least:g} to {self.most:g} mm"
+        for unit, factor in (("centimetres", 10.0), ("metres", 1000.0)):
+            if self.least <= factor * value <= self.most:
+                return f"{words}. It looks like {unit}: write {factor * value:g}"
+        return words
+
+    def __get_pydantic_core_schema__(self, kind: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return no_info_wrap_validator_function(self._read, handler(kind))
+
+    def _read(self, value: object, read: ValidatorFunctionWrapHandler) -> object:
+        """The value as it is read without this mark. Raises PydanticCustomError, ValidationError."""
+        try:
+            return read(value)
+        except ValidationError:
+            if isinstance(value, int | float) and not self.least <= value <= self.most:
+                raise PydanticCustomError("length", "{words}", {"words": self.refusal(value)}) from None
+            raise
+
+
+@dataclass(frozen=True, slots=True)
 class Parameter:
     """One parameter as it is declared. kind : its type without marks. default : REQUIRED where there is none. info :
     its help and limits. marks : Terminal, Web and kin. any_name : it stands for any other keyword.
@@ -156,7 +188,7 @@ class Parameter:
 
     def limited(self, kind: Any) -> Any:  # noqa: ANN401 - a type
         """A type held to what the values are held to."""
-        limits = [mark for mark in self.marks if isinstance(mark, BaseMetadata)]
+        limits = [mark for mark in self.marks if isinstance(mark, BaseMetadata | Millimetres)]
         return Annotated[(kind, *limits)] if limits else kind
 
     @property

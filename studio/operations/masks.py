@@ -380,7 +380,7 @@ def _possible_sources(session: Session, cameras: Sequence[BackgroundCamera]) -> 
         "masks": all(given_masks_of(session).values()),
         "best": session.is_comparable,
         "subject": session.is_comparable,
-        "animal": session.is_comparable and bool(cameras) and all(one.given == "plate" for one in cameras),
+        "animal": session.is_comparable and all(one.given for one in cameras),
     }
     return tuple(name for name in SOURCES if cameras and needs.get(name, True))
 

@@ -15,7 +15,7 @@ from studio.foundations.errors import StudioError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.knobs import Value
 from studio.operations.comparison_folders import comparison_count
-from studio.operations.run_errors import mean_error
+from studio.operations.run_errors import evaluation_of
 from studio.operations.run_settings import history_of
 from studio.runs.setup.silhouette_faults import known_faults
 from studio.runs.sides import notes_of
@@ -39,10 +39,12 @@ class RunLine(RunSummary):
 
     describe : tracker, layers and particles in a few words.
     mean_mm : mean marker error where the session has a truth.
+    measured_frames : in how many of its frames.
     """
 
     describe: str = ""
     mean_mm: float | None = None
+    measured_frames: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,7 +273,8 @@ def run_line(summary: RunSummary, session: Session | None) -> RunLine:
         run = session.run(line.name)
         line = replace(line, describe=describe(run.record))
         line = replace(line, describe=describe(run.record, history_of(run)))
-        return replace(line, mean_mm=mean_error(session, run, line.done))
+        errors = evaluation_of(session, run, blobs=False) if line.done else None
+        return replace(line, mean_mm=errors.mean_mm, measured_frames=len(errors.frames)) if errors else line
     except StudioError:
         return line
 

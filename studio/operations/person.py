@@ -23,7 +23,7 @@ from studio.results.overlay_pictures import forget_composers
 from studio.runs.setup.initialising import WEIGHTING, InitialPose, keep_pose
 from studio.runs.setup.initialising import initialise as initialise_session
 from studio.runs.setup.person_landmarks import person_landmarks
-from studio.runs.setup.subject_choice import body_of_choice, choose_body, choose_subject, keep_fitted
+from studio.runs.setup.subject_choice import body_of_choice, choose_subject, keep_fitted, lengths_left_out
 from studio.runs.setup.subject_fitting import (
     FitRequest,
     FittedSubject,
@@ -65,14 +65,15 @@ def subject(
     Raises BodyError for an unknown body or length, or a size that is impossible.
     """
     opened = open_session(session)
-    if height_mm is None and not lengths_mm:
-        tree, notes = (choose_body(opened, body) if body else opened).body_with_notes()
+    wanted = Subject(
+        body=body or opened.manifest.body, height_mm=height_mm, lengths_mm=dict(lengths_mm or {})
+    )
+    if wanted == Subject(body=wanted.body) and not body:
+        tree, notes = opened.body_with_notes()
     else:
-        wanted = Subject(
-            body=body or opened.manifest.body, height_mm=height_mm, lengths_mm=dict(lengths_mm or {})
-        )
-        choose_subject(opened, wanted)
-        tree, notes = body_of_choice(opened, wanted)
+        lost = lengths_left_out(opened, wanted)
+        tree, notes = choose_subject(opened, wanted).body_with_notes()
+        notes = (*notes, *lost)
     forget_composers()
     say(progress, notes)
     return tree

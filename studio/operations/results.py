@@ -43,7 +43,7 @@ from studio.search.trackers.smoothing import SmoothingSettings
 
 TrackName = Annotated[
     str,
-    Field(description="Best: smoothed, else refined, else raw; or any track's name."),
+    Field(description="Best: smoothed, else refined, else sides, else raw; or any track's name."),
     Terminal(metavar="NAME"),
 ]
 Origin = Annotated[str, Terminal("--from")]
@@ -60,7 +60,7 @@ def read_track(run: RunName, track: TrackName = BEST) -> Track:
     """A track of a run as arrays.
 
     run : SESSION/RUN, a run's folder, or a run.
-    track : "best" (smoothed, else refined, else raw) or a track's name.
+    track : "best" (smoothed, else refined, else sides, else raw) or a track's name.
 
     Raises NotFoundError where there is no such track.
     """
@@ -71,7 +71,7 @@ def markers(run: RunName, track: TrackName = BEST) -> MarkerMotion:
     """The body's markers along a track.
 
     run : SESSION/RUN, a run's folder, or a run.
-    track : "best" (smoothed, else refined, else raw) or a track's name.
+    track : "best" (smoothed, else refined, else sides, else raw) or a track's name.
 
     Raises NotFoundError where there is no such track.
     """

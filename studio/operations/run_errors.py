@@ -74,12 +74,6 @@ def measured(session: Session, run: StoredRun) -> Evaluation:
     return errors
 
 
-def mean_error(session: Session, run: StoredRun, done: int) -> float | None:
-    """The mean marker error in mm; None where there is nothing to measure."""
-    measured = evaluation_of(session, run, blobs=False) if done else None
-    return None if measured is None else measured.mean_mm
-
-
 def _poses_of(run: StoredRun, track: str, blobs: bool) -> tuple[Indices, Array]:
     """The frames (K,) of a track and its poses (K, D)."""
     if track != RAW:

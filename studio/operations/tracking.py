@@ -13,7 +13,6 @@ from studio.foundations.declaring import (
     Body,
     Knobs,
     Model,
-    OneOf,
     Seed,
     Terminal,
     Values,
@@ -45,11 +44,18 @@ from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.live.live_replay import Comparison, prepare_replay
 from studio.runs.live.live_request import last_of
 from studio.runs.live.live_summary import LiveSummary, in_words, summary_of
-from studio.runs.new_run import DESPITE, Numbers, Pose, given_pose, own_knobs, prepare_run
+from studio.runs.new_run import (
+    DESPITE,
+    Numbers,
+    Pose,
+    TrackerName,
+    WeightingName,
+    given_pose,
+    own_knobs,
+    prepare_run,
+)
 from studio.runs.sides import corrections_of
 from studio.runs.tracks import pose_in_track, read_track
-from studio.search.likelihood.catalogue import WEIGHTINGS
-from studio.search.trackers.catalogue import TRACKERS
 from studio.sessions.names import free_name
 from studio.sessions.remote_sessions import address_of, bring_runs, free_run_name_at, put_run
 from studio.sessions.session import Session
@@ -168,10 +174,16 @@ class TrackedLive:
 class LiveRequest:
     """What a live run takes."""
 
-    tracker: Annotated[str, Field(description="What searches."), OneOf(TRACKERS)] = "behaviour"
-    weighting: Annotated[str, Field(description="The likelihood."), OneOf(WEIGHTINGS)] = "blobs"
+    tracker: TrackerName = ""
+    weighting: WeightingName = ""
     body: Body = ""
-    behaviour: Model = ""
+    behaviour: Annotated[
+        Model,
+        Field(
+            description="Behaviour model, by name or file; unless others are named, tracker behaviour follows it on"
+            " likelihood blobs."
+        ),
+    ] = ""
     first: Annotated[int, Field(ge=0, description="The frame that comes first."), Terminal("--from")] = 0
     seconds: Annotated[
         float | None, Field(gt=0, le=86400, description="Seconds to track; default: to the footage's end.")

@@ -31,7 +31,7 @@ class TrackLine:
 
     made_by : verb, source, settings, and of a smoothed one the frames that were filled and left out; empty for raw.
     jitter_mm : root mean square second difference of the markers.
-    mean_mm, worst_mm : against the session's truth.
+    mean_mm, worst_mm : against the session's truth. measured_frames : in how many frames.
     mean_angle_deg, mean_direction_deg : the same, of the angles between limbs and of the limbs' directions.
     """
 
@@ -43,6 +43,7 @@ class TrackLine:
     mean_angle_deg: float | None = None
     mean_direction_deg: float | None = None
     worst_mm: float | None = None
+    measured_frames: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +131,7 @@ def _line(session: Session, run: StoredRun, name: str) -> tuple[TrackLine, str]:
         mean_angle_deg=errors and errors.mean_angle_deg,
         mean_direction_deg=errors and errors.mean_direction_deg,
         worst_mm=errors and errors.worst_mm,
+        measured_frames=len(errors.frames) if errors else 0,
     )
     return line, problem
 

@@ -36,7 +36,7 @@ from studio.foundations.knobs import Knob
 from studio.foundations.package import software_version
 from studio.foundations.progress import Progress, no_progress
 from studio.runs.behaviour_models import chosen_model
-from studio.runs.live.live_request import check_live, live_changes
+from studio.runs.live.live_request import check_live, live_changes, live_search
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.setup.contrast import KnownPoses, contrast_notes
 from studio.runs.setup.initialising import InitialPose, initialise
@@ -70,19 +70,21 @@ def own_knobs() -> list[Knob]:
 Pose = ArrayLike | InitialPose | str | Path
 """(D,) radians and mm in the body's order, what `initialise` found, or a file: a CSV row or a TRC."""
 Numbers = list[float] | None
+TrackerName = Annotated[
+    str, Field(description=f"Default: the session's own, else {DEFAULT_TRACKER}."), OneOf(TRACKERS)
+]
+WeightingName = Annotated[
+    str,
+    Field(description=f"The likelihood; default: the session's own, else {DEFAULT_WEIGHTING}."),
+    OneOf(WEIGHTINGS),
+]
 
 
 def prepare_run(
     session: Annotated[Session, Target("session")],
     *,
-    tracker: Annotated[
-        str, Field(description="Default: the session's own, else annealed."), OneOf(TRACKERS)
-    ] = "",
-    weighting: Annotated[
-        str,
-        Field(description=f"The likelihood; default: the session's own, else {DEFAULT_WEIGHTING}."),
-        OneOf(WEIGHTINGS),
-    ] = "",
+    tracker: TrackerName = "",
+    weighting: WeightingName = "",
     body: Body = "",
     subject: Annotated[
         Subject | str | Path | None,
@@ -157,6 +159,8 @@ def prepare_run(
     """
     of_masks = look_before_the_first_run(session, progress)
     faults = accepted_faults(session, allow_inconsistent)
+    if live:
+        tracker, weighting = live_search(tracker, weighting, behaviour)
     tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
     settings = session_settings(session, tracker, weighting, live_changes(knobs or {}) if live else knobs)
@@ -290,7 +294,7 @@ def _find_start(
     except StudioError as error:
         raise RunError(
             f"Session '{session.name}' has no start pose, and none can be found: {error.message}",
-            "Give one with --start-pose FILE (a CSV row, or a TRC), or set it in the studio.",
+            error.hint or "Give one with --start-pose FILE (a CSV row, or a TRC), or set it in the studio.",
         ) from None
 
 

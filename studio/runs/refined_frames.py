@@ -154,7 +154,9 @@ class _Work:
         self._count_read()
 
     def refine_together(self, rows: NDArray[np.int64]) -> None:
-        mover = MovementRefiner(self._refiner, self._record.fps, self._knobs.refinement_acceleration)
+        mover = MovementRefiner(
+            self._refiner, self._record.fps, self._knobs.refinement_acceleration, self._as_tracked
+        )
         seen: list[_SeenFrame] = []
         for first, after, kept in windows(len(rows)):
             while first + len(seen) < after:

@@ -1,7 +1,9 @@
 """`studio background` says what comes next where masks are of no use."""
 
+from pathlib import Path
+
 import pytest
-from command_line import call
+from command_line import call, refusal_of
 
 from studio.cli.main import main
 from studio.cli.mask_commands import _answer
@@ -32,6 +34,14 @@ def test_the_command_that_is_named_is_one(session_on_disk: Session) -> None:
     assert "best" in help_text
     with pytest.raises(SystemExit):
         main(["background", "no-such-session", "--source", "best"])
+
+
+def test_plates_that_are_not_there_are_said_to_be_so(session_on_disk: Session, tmp_path: Path) -> None:
+    assert "There is no folder '/nosuch'" in refusal_of("background toy --plates /nosuch")
+    file = tmp_path / "empty.png"
+    file.touch()
+    assert f"Write CAMERA={file}" in refusal_of("background toy --plates", file)
+    assert "'--plates =x' cannot be understood" in refusal_of("background toy --plates =x")
 
 
 def test_low_contrast_is_said_with_what_may_help(session_on_disk: Session) -> None:

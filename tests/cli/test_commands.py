@@ -40,6 +40,36 @@ def test_the_list_of_commands_says_what_each_ones_help_begins_with(name: str) ->
     assert len(summary(name)) > 10
 
 
+def leaves() -> list[tuple[list[str], click.Command]]:
+    """All commands, those of groups too, with the words that call them."""
+    found: list[tuple[list[str], click.Command]] = []
+    for name in COMMANDS:
+        one = load(name)
+        parts = one.commands.items() if isinstance(one, click.Group) else ()
+        found += [([name, part], below) for part, below in parts] or [([name], one)]
+    return found
+
+
+def test_every_required_option_that_is_left_out_is_named() -> None:
+    left_out: list[str] = []
+    for words, one in leaves():
+        required = [entry for entry in one.params if entry.required]
+        given = {entry: [*entry.opts[:1], "1"] for entry in required if isinstance(entry, click.Option)}
+        arguments = ["x" for entry in required if isinstance(entry, click.Argument)]
+        for option in given:
+            others = [word for other, pair in given.items() if other is not option for word in pair]
+            said = refusal_of("", *words, *arguments, *others)
+            assert f"Missing option '{option.opts[0]}'" in said, words
+            left_out.append(f"{' '.join(words)} {option.opts[0]}")
+    assert {"import --into", "correct --at", "sweep --vary", "arena export --frames"} <= {*left_out}
+
+
+def test_an_option_that_is_not_required_has_no_value_where_it_is_left_out() -> None:
+    values = load("track").make_context("track", ["toy"]).params
+    assert values["start_pose"] is None
+    assert values["seed"] == 0
+
+
 def test_bodies_lists_parameters_and_limbs() -> None:
     bodies = {entry["name"]: entry for entry in answer_of("bodies")["bodies"]}
     assert bodies["human31"]["parameters"] == 31

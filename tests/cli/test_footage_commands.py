@@ -127,6 +127,31 @@ def test_one_of_several_trials(footage: Path, workspace: Path, tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
+    ("place", "kind", "instead"),
+    [
+        ("videos/cam1.mp4", "one camera's video", "--calibration FILE"),
+        ("calibration/Calib.toml", "a calibration", "calibration/Calib.toml"),
+        ("one.png", "a picture", "folder of pictures a camera"),
+        ("notes.txt", "a file", "a zip or tar"),
+    ],
+)
+def test_a_single_file_is_named_with_what_to_give_instead(
+    footage: Path, workspace: Path, place: str, kind: str, instead: str
+) -> None:
+    (footage / place).touch()
+    said = refusal_of("import", footage / place, "--into", "take")
+    assert f"is {kind}, and no folder of footage" in said
+    assert instead in said
+    assert "There is no folder" in refusal_of("import", footage / "nothing", "--into", "take")
+
+
+def test_videos_alone_need_the_calibrations_file(footage: Path, workspace: Path) -> None:
+    assert "--calibration FILE" in refusal_of("import", footage / "videos", "--into", "take")
+    file = footage / "calibration" / "Calib.toml"
+    answer_of("import", footage / "videos", "--into", "take", "--calibration", file)
+
+
+@pytest.mark.parametrize(
     ("words", "cause"),
     [
         (["--offset", "cam1"], "'--offset cam1' cannot be understood"),

@@ -3,6 +3,9 @@
 import pytest
 from command_line import answer_of, call, refusal_of
 
+from studio.foundations.errors import CalibrationError
+from studio.runs import new_run
+from studio.runs.setup.initialising import InitialPose
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
@@ -33,6 +36,20 @@ def test_a_start_pose_is_written_and_then_kept(session_on_disk: Session) -> None
 def test_refusals(session_on_disk: Session, words: list[str], cause: str) -> None:
     assert cause in refusal_of("initialise toy", *words)
     assert not (session_on_disk.path / "start_pose.csv").exists()
+
+
+def test_track_passes_on_why_no_start_pose_is_found(
+    session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def finds_none(*_: object, **__: object) -> InitialPose:
+        raise CalibrationError("No two cameras see a common place.", "Check the calibration's unit.")
+
+    monkeypatch.setattr(new_run, "initialise", finds_none)
+    monkeypatch.setattr(new_run, "_has_limits", lambda _: False)
+    said = refusal_of("track toy --frames :1")
+    assert "none can be found: No two cameras see a common place." in said
+    assert "remedy Check the calibration's unit." in said
+    assert "--start-pose" not in said
 
 
 def test_track_tells_how_it_went(session_on_disk: Session) -> None:

@@ -3,10 +3,13 @@
 import json
 
 import pytest
+from arm_behaviour import keep_arm_model
 from command_line import answer_of, call, refusal_of
 from toy_session import FRAMES, true_poses
 
 from studio.garden.benchmarks.live_stages import in_words, stage_rows
+from studio.runs.new_run import prepare_run
+from studio.search.settings import DEFAULT_TRACKER
 from studio.sessions.named_rows import write_pose
 from studio.sessions.session import Session
 
@@ -41,6 +44,22 @@ def test_words_for_a_person(started: Session) -> None:
     assert started.runs()[-1].record.first == 2
     assert started.runs()[-1].record.last == FRAMES
     assert "bit for bit" in call("live toy --replay", started.runs()[-1].name).stdout
+
+
+def test_without_a_model_it_tracks_as_any_new_run_does(started: Session) -> None:
+    few = ("--particles", "20", "--layers", "2")
+    printed = answer_of("live toy", *few)
+    assert (printed["tracker"], printed["weighting"]) == (DEFAULT_TRACKER, started.manifest.weighting)
+
+
+def test_a_named_model_is_followed(started: Session) -> None:
+    keep_arm_model(started.path.parent)
+    run = prepare_run(started, behaviour="swings", live=True)
+    assert (run.record.tracker, run.record.weighting) == ("behaviour", "blobs")
+    other = prepare_run(
+        started, tracker="condensation", weighting="edge-region", behaviour="swings", live=True
+    )
+    assert (other.record.tracker, other.record.weighting) == ("condensation", "edge-region")
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,8 @@ import pytest
 from command_line import answer_of, call, refusal_of
 from two_people import TwoPeople, two_people
 
+from studio.sessions.session import Session
+
 
 @pytest.fixture
 def people(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> TwoPeople:
@@ -22,6 +24,21 @@ def test_who_is_in_view_is_listed_and_each_gets_a_session(people: TwoPeople) -> 
     assert "ann" in refusal_of("subjects two --at", places[0], "--into", "ann")
     done = answer_of("together ann --beside bob")
     assert done["bodies"] == 2
+
+
+@pytest.mark.parametrize(
+    ("height", "meant"),
+    [
+        ("164.5", "looks like centimetres: write 1645."),
+        ("1.7", "looks like metres: write 1700."),
+        ("20", "mm."),
+    ],
+)
+def test_a_height_of_another_unit_is_named(session_on_disk: Session, height: str, meant: str) -> None:
+    said = refusal_of("subject toy --height", height)
+    assert f"{height} mm is not from 300 to 3000 mm" in said
+    assert meant in said
+    assert "is not a valid float" in refusal_of("subject toy --height tall")
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from kept_overlays import keep_overlays
 import studio
 from studio.body.forward_kinematics import marker_points
 from studio.foundations.arrays import Array
+from studio.runs.refining import jitter
 from studio.runs.setup.initialising import InitialPose
 from studio.runs.setup.mask_quality import MaskQuality
 from studio.sessions.session import Session
@@ -162,3 +163,19 @@ def test_it_is_never_turned_round(workflow: Workflow) -> None:
     turns = np.einsum("ni,ni->n", along[1:], along[:-1])
     print(round(float(turns.min()), 2), "in frame", int(track.frames[1 + turns.argmin()]))
     assert float(turns.min()) > AHEAD
+
+
+def test_refining_the_clip_keeps_the_tail_and_jitters_less(
+    workflow: Workflow, labels: dict[int, dict[str, Array]], footage: Path
+) -> None:
+    before = studio.read_track(workflow.run, "sides")
+    studio.refine(workflow.run)
+    track = studio.read_track(workflow.run, "refined")
+    frames = track.frames.tolist()
+    for frame, points in points_of(footage, TAIL).items():
+        pose = track.poses[frames.index(frame)]
+        off = errors(workflow.session, workflow.run, pose, {**labels[frame], **points})
+        print(frame, {name: round(value, 1) for name, value in off.items()})
+        assert float(np.mean([off[name] for name in labels[frame]])) < TRACKED_MM[frame]
+        assert max(off[name] for name in points) < TAIL_MM
+    assert jitter(workflow.run, track) < jitter(workflow.run, before)

@@ -63,7 +63,7 @@ def test_the_true_poses_fit_and_others_do_not(session):
     assert "not where masks or pictures show it in" in wrong.in_words()
     assert not wrong.good
     assert check_step(session).state == "done"
-    assert "check the marked frames" in check_step(session).why
+    assert "look at the frames" in check_step(session).why
 
 
 def test_a_body_that_turns_round_at_once_is_named():

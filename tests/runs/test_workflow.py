@@ -7,9 +7,10 @@ import msgspec
 import pytest
 from tracked_runs import finish
 
-from studio.body.subject import Subject, write_subject
+from studio.body.subject import Subject, read_subject, write_subject
 from studio.foundations.errors import SessionError
 from studio.runs.new_run import prepare_run
+from studio.runs.setup.subject_choice import choose_subject, lengths_left_out
 from studio.runs.setup.workflow import run_to_use, subject_step, workflow_of
 from studio.sessions.provenance import note
 from studio.sessions.results_store import ResultsWriter
@@ -56,6 +57,21 @@ def test_a_fitted_subject_is_as_tall_as_its_body_stands_not_as_was_guessed(tmp_p
     write_subject(msgspec.structs.replace(guess, dimensions_mm=shorter), session.path / SUBJECT_NAME)
     note(session, "subject")
     assert subject_step(session).words == "human31, 1.78 m, fitted to the footage"
+
+
+def test_a_height_that_replaces_measured_lengths_says_so_and_keeps_them(tmp_path: Path) -> None:
+    session = begin_session(Workspace(tmp_path).place_for("mine"), body="human31")
+    measured = Subject(body="human31", lengths_mm={"LHip_LKnee": 430.0, "LKnee_LAnkle": 410.0})
+    write_subject(measured, session.path / SUBJECT_NAME)
+    assert subject_step(session).words == "human31, by 2 measured lengths"
+    height = Subject(body="human31", height_mm=1800.0)
+    [note_of_it] = lengths_left_out(session, height)
+    assert "2 measured lengths (LHip_LKnee, LKnee_LAnkle)" in note_of_it
+    assert not lengths_left_out(session, measured)
+    choose_subject(session, height)
+    assert subject_step(session).words == "human31, 1.80 m, by height"
+    assert read_subject(session.path / "subject-before.toml") == measured
+    assert not lengths_left_out(session, height)
 
 
 def test_a_cancelled_run_does_not_hide_the_whole_one(session_on_disk: Session) -> None:

@@ -109,6 +109,25 @@ def test_the_remedies_work(tmp_path: Path, up: str, axes: np.ndarray) -> None:
         assert np.linalg.det(found.rotation) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(
+    ("up", "right", "axes"),
+    [(up, "z", np.eye(3)) for up in ("x", "y", "-x", "-y", "-z")]
+    + [(up, "y", Y_UP) for up in ("x", "z", "-x", "-y", "-z")],
+)
+def test_the_remedy_for_a_wrong_axis_does_not_lead_to_another(
+    tmp_path: Path, up: str, right: str, axes: np.ndarray
+) -> None:
+    """Whichever axis was named wrongly: the one that the remedy names is right."""
+    source = video_source(tmp_path / "source")
+    path = source / "calibration" / "Calib.toml"
+    export_calibration(tuple(in_world(camera, axes) for camera in CAMERAS), path, "aniposelib")
+    with pytest.raises(CalibrationError, match=f"{right.upper()} axis points up .* not") as caught:
+        import_source(source, tmp_path / "made", ImportOptions(up=up, unit="mm"))
+    assert f"--up={right} " in caught.value.hint.replace(",", " ")
+    report = import_source(source, tmp_path / "made", ImportOptions(up=right, unit="mm"))
+    assert not any("axis" in line for line in report.warnings)
+
+
 def test_a_named_unit_is_believed_and_the_doubt_is_said(tmp_path: Path) -> None:
     source = video_source(tmp_path / "source")
     close = (replace(camera, translation=camera.translation / 100.0) for camera in CAMERAS)

@@ -119,7 +119,8 @@ def test_a_trial_alone_says_where_its_calibration_may_be(tmp_path: Path) -> None
     source = batch(tmp_path / "source") / "Trial_1"
     with pytest.raises(CalibrationError, match="no calibration") as caught:
         import_source(source, tmp_path / "made")
-    assert "import the folder above with --trial" in caught.value.hint
+    assert "Where the folder above has it, import that one, with --trial NAME" in caught.value.hint
+    assert "--calibration FILE" in caught.value.hint
     with pytest.raises(FootageError, match="holds none named 'x'"):
         import_source(video_source(tmp_path / "one"), tmp_path / "made", ImportOptions(trial="x"))
 

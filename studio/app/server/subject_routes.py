@@ -15,7 +15,6 @@ from studio.app.server.requests import Arguments, body_of
 from studio.app.server.schemas import Numbers
 from studio.app.server.session_routes import OpenSession
 from studio.body.model import BodyModel
-from studio.body.subject import SHORTEST_MM, TALLEST_MM
 from studio.body.upright import LimbDrawing, limb_drawings
 from studio.foundations.arrays import Array
 from studio.foundations.errors import BodyError, NotFoundError
@@ -75,29 +74,16 @@ def set_subject(
     session: OpenSession,
     arguments: Annotated[
         Arguments,
-        body_of(
-            write_subject,
-            "SubjectRequest",
-            without=("height_mm",),
-            height_mm=(
-                float | None,
-                Field(
-                    None,
-                    ge=SHORTEST_MM,
-                    le=TALLEST_MM,
-                    description="Left out: a body alone, in its file's size.",
-                ),
-            ),
-        ),
+        body_of(write_subject, "SubjectRequest"),
     ],
     app: App,
 ) -> SubjectInUse:
     """Write down a height (and measured lengths); everything else follows by published proportions. A body that is
     named becomes the session's; without a height, as with animals, in its file's size.
     """
-    if arguments.more["height_mm"] is None and not (arguments.get("body") or arguments.get("lengths_mm")):
+    if not any(arguments.get(name) for name in ("height_mm", "body", "lengths_mm")):
         raise BodyError("Neither a height nor a body is given.", "Give one of them.")
-    write_subject(session, **arguments, **arguments.more, progress=no_progress)
+    write_subject(session, **arguments, progress=no_progress)
     app.jobs.forget(SUBJECT, session.name)
     app.events.session_changed(session.name)
     return subject(Session(session.path))

@@ -24,16 +24,18 @@ def check_calibration(
     height_mm: float | None = None,
     scale: float = 1.0,
     distances_mm: Mapping[tuple[str, str], float] | None = None,
+    up: str = "z",
 ) -> tuple[Finding, ...]:
     """All findings on a calibration, blocking ones first; none for a good one.
 
     footage_sizes : (width, height) of each camera's footage. board, detections : board footage taken with these
     cameras. masks : silhouettes of one person, frame → camera → (H, W), nonzero = person. height_mm : the person's.
     scale : of the body beside a person (`scale_of`).
-    distances_mm : measured distances between two cameras' lenses. Each argument adds checks.
+    distances_mm : measured distances between two cameras' lenses. Each argument adds checks. up : the axis of the
+    file's world that was taken for the cameras' z: findings name the file's axes.
     """
     sizes = {detection.camera: detection.size for detection in detections} | dict(footage_sizes or {})
-    findings = [*size_findings(cameras, sizes), *rig_findings(cameras)]
+    findings = [*size_findings(cameras, sizes), *rig_findings(cameras, up)]
     # Where sizes or rotations are wrong, views disagree for that reason; nothing more is to be learnt from them.
     if not any(finding.code in FIRST_CAUSES for finding in findings):
         if board is not None and detections:

@@ -13,6 +13,7 @@ from studio.footage.capture.sanity import common_target
 from studio.foundations.arrays import Array
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.rotations import orthonormality_error
+from studio.foundations.geometry.worlds import WORLDS
 
 ROTATION_TOLERANCE = 1e-3
 SMALLEST_RIG_MM, LARGEST_RIG_MM = 100.0, 100_000.0
@@ -34,6 +35,7 @@ LEVEL_IT = (
     " feet of a run, or --clicks of floor points); or calibrate with the board on the floor (studio calibrate --floor)."
 )
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+_SIX_AXES = tuple(sign * np.array(axis) for axis in AXES.values() for sign in (1.0, -1.0))
 STEREO_MM = 15.0
 """Cameras side by side lie at least so far from their middle."""
 CENTRED = (0.2, 0.8)
@@ -41,14 +43,15 @@ SIZE_TOLERANCE = 0.02
 ASPECT_TOLERANCE = 0.01
 
 
-def rig_findings(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
-    """Doubts that need nothing but the cameras."""
+def rig_findings(cameras: Sequence[Camera], up: str = "z") -> tuple[Finding, ...]:
+    """Doubts that need nothing but the cameras. up : the axis of the file's world that was taken for the cameras' z."""
     wrong = tuple(_rotations(cameras))
     if wrong:
         return wrong
     turned = tuple(_transposed(cameras))
-    checks = () if turned else (_up_axis, _floor, _origin, _unit, _place)
-    return (*turned, *(finding for check in (*checks, _principal) for finding in check(cameras)))
+    axes = () if turned else tuple(_up_axis(cameras, up))
+    checks = () if turned else (_floor, _origin, _unit, _place)
+    return (*turned, *axes, *(finding for check in (*checks, _principal) for finding in check(cameras)))
 
 
 def size_findings(
@@ -142,25 +145,23 @@ def _transposed(cameras: Sequence[Camera]) -> Iterator[Finding]:
                 return
 
 
-def _up_axis(cameras: Sequence[Camera]) -> Iterator[Finding]:
+def _up_axis(cameras: Sequence[Camera], up: str) -> Iterator[Finding]:
     vertical = common_vertical(cameras)
     if upright_about(cameras, np.array(AXES["Z"])):
         yield from _tilt(vertical)
         return
-    for name, direction in AXES.items():
-        for sign, word in ((1.0, ""), (-1.0, "minus ")):
-            if upright_about(cameras, sign * np.array(direction)):
-                off = vertical.off(sign * np.array(direction)) if vertical is not None else 0.0
-                message = f"The world's {word}{name} axis points up in all pictures, not Z"
-                message += (
-                    f"; the cameras' common vertical is {off:.1f} degrees off it." if off > 1.0 else "."
-                )
-                yield Finding("up-axis", "blocks", message, _remedy(name, sign))
-                return
+    for direction in _SIX_AXES:
+        if upright_about(cameras, direction):
+            off = vertical.off(direction) if vertical is not None else 0.0
+            axis = _axis_of_file(direction, up)
+            message = f"The world's {_spoken(axis)} axis points up in all pictures, not {_spoken(up)}"
+            message += f"; the cameras' common vertical is {off:.1f} degrees off it." if off > 1.0 else "."
+            yield Finding("up-axis", "blocks", message, _import_with(axis))
+            return
     if vertical is not None and vertical.level and vertical.off(np.array(AXES["Z"])) <= LYING_DEGREES:
         yield from _tilt(vertical)
     elif vertical is not None and not _upright_in_turned_pictures(cameras):
-        yield from _lying(cameras, vertical)
+        yield from _lying(cameras, vertical, up)
 
 
 def _tilt(vertical: Vertical | None) -> Iterator[Finding]:
@@ -175,17 +176,16 @@ def _tilt(vertical: Vertical | None) -> Iterator[Finding]:
     yield Finding(TILTED, "warns", message, LEVEL_IT)
 
 
-def _lying(cameras: Sequence[Camera], vertical: Vertical) -> Iterator[Finding]:
+def _lying(cameras: Sequence[Camera], vertical: Vertical, up: str) -> Iterator[Finding]:
     """Z is not upright, and no axis is in all pictures."""
     off = vertical.off(np.array(AXES["Z"]))
     if off <= ASKEW_DEGREES:
         return
-    signed = [(sign, name) for name in AXES for sign in (1.0, -1.0)]
-    sign, name = min(signed, key=lambda one: vertical.off(one[0] * np.array(AXES[one[1]])))
-    nearest = vertical.off(sign * np.array(AXES[name]))
-    word = "" if sign > 0.0 else "minus "
+    direction = min(_SIX_AXES, key=vertical.off)
+    axis, nearest = _axis_of_file(direction, up), vertical.off(direction)
     message = (
-        f"The world's Z axis does not point up in the pictures: it is {off:.0f} degrees off their common up."
+        f"The world's {_spoken(up)} axis does not point up in the pictures: it is {off:.0f} degrees off their"
+        " common up."
     )
     if off <= LYING_DEGREES:
         yield Finding(TILTED, "warns", message, LEVEL_IT)
@@ -194,16 +194,35 @@ def _lying(cameras: Sequence[Camera], vertical: Vertical) -> Iterator[Finding]:
     looks_down = all(camera.centre[2] > 0.0 and camera.rotation[2, 2] < 0.0 for camera in cameras)
     if looks_down and not vertical.level:
         return
-    message = f"{message} {word}{name}".replace(". minus", ". Minus")
+    message = f"{message} {_spoken(axis)}".replace(". minus", ". Minus")
     message += f" is the likeliest, {nearest:.0f} degrees off" + ("." if vertical.level else " (roughly).")
-    yield Finding("up-axis", "blocks", message, _remedy(name, sign))
+    yield Finding("up-axis", "blocks", message, _import_with(axis))
 
 
-def _remedy(name: str, sign: float) -> str:
-    spelt = f"--up={'' if sign > 0 else '-'}{name.lower()}"
+def _axis_of_file(direction: Array, up: str) -> str:
+    """The axis of the file's world ("x", "-z", …) that an axis of the cameras' world is, (3,) with one entry of 1 or
+    -1, where the file's `up` was taken for their z.
+    """
+    in_file = np.array(WORLDS[up], dtype=np.float64).T @ direction
+    number = int(np.argmax(np.abs(in_file)))
+    return ("-" if in_file[number] < 0.0 else "") + "xyz"[number]
+
+
+def _spoken(axis: str) -> str:
+    """ "-x" as "minus X"."""
+    return axis.upper().replace("-", "minus ")
+
+
+def _import_with(axis: str) -> str:
+    """The remedy for a world in which the file's `axis` points up."""
+    if axis == "z":
+        return (
+            "Import it with --up=z, or without --up, which is the same; where that axis is not exactly vertical, level"
+            " it then (studio level)."
+        )
     return (
-        f"Import it with {spelt} (of x, y, z, -x, -y, -z), or export the calibration with Z up; where that axis is not"
-        " exactly vertical, level it then (studio level)."
+        f"Import it with --up={axis} (of x, y, z, -x, -y, -z), or export the calibration with Z up; where that axis is"
+        " not exactly vertical, level it then (studio level)."
     )
 
 

@@ -51,6 +51,7 @@ __all__ = [
     "calibration_text",
     "export_calibration",
     "find_calibrations",
+    "is_calibration",
     "read_calibration",
     "read_intrinsics",
     "write_calibration",
@@ -104,6 +105,14 @@ def find_calibrations(folder: Path) -> tuple[Path, ...]:
     if not files:
         files = _of_other_tools(folder)
     return tuple(sorted(files, key=lambda path: natural_key(path.name)))
+
+
+def is_calibration(path: Path) -> bool:
+    """Whether a file can be read as a calibration."""
+    try:
+        return bool(read_calibration(path).cameras)
+    except CalibrationError:
+        return False
 
 
 def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:

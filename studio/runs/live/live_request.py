@@ -13,12 +13,22 @@ from studio.search.settings import RunSettings
 from studio.search.trackers.recovery_settings import SPREAD
 from studio.sessions.session import Session
 
+BEHAVIOUR, BLOBS = "behaviour", "blobs"
+
 
 def live_changes(changes: Mapping[str, object]) -> dict[str, object]:
     """The knobs of a live run that differ from the defaults: the requested ones, a quick recovery, and no looking for
     thin limbs, which takes long and a background of frames that are still to come.
     """
     return {"recovery": SPREAD, "thin_limbs": False, **changes}
+
+
+def live_search(tracker: str, weighting: str, model: str) -> tuple[str, str]:
+    """The tracker and likelihood of a live run, "" for those of any new run. model : the named behaviour model, "" for
+    none: it is followed by the tracker that needs one, on blobs, which are weighed quickly enough.
+    """
+    tracker = tracker or (BEHAVIOUR if model else "")
+    return tracker, weighting or (BLOBS if tracker == BEHAVIOUR else "")
 
 
 def check_live(settings: RunSettings, *, live: bool, ping_pong: bool) -> None:

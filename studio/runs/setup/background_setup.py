@@ -128,10 +128,10 @@ MASK_SOURCES: dict[BackgroundSource, MaskSource] = {
     "median": MaskSource("Median", "The median of the footage. Good if the subject moves about.", "median"),
     "animal": MaskSource(
         "Animal",
-        "Before a picture of the empty place from each camera: without shadows and reflections in the floor or in "
+        "Before a picture or clip of each camera's empty place: without shadows and reflections in the floor or in "
         "glass, with a tail and legs a few pixels wide; where the place has the animal's colour, other views decide.",
         "auto",
-        lacking="Give a picture of the empty place for every camera below, and calibrate the cameras.",
+        lacking="Give a picture or clip of the empty place for every camera below, and calibrate the cameras.",
         home=ANIMAL_MASKS,
         has_knobs=False,
     ),
@@ -339,7 +339,9 @@ def _set_up(
         session = use_cleaned(session, {name: plate.picture for name, plate in plates.items()})
         model = "gaussian"
         for name, plate in plates.items():
-            notes.append(f"{name}: {100.0 * plate.never_empty:.0f} % of the picture was never seen empty.")
+            notes.append(
+                f"{name}: {100.0 * plate.never_empty:.0f} % of the picture are empty in no frame of the footage."
+            )
             if wanted.exclude_unused and not (session.path / "exclusions" / f"{name}.png").exists():
                 set_exclusion(session, name, png_of(plate.never_taken))
     own: dict[str, Knob] = {"background_model": model, **chosen}

@@ -6,13 +6,14 @@ import msgspec
 
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
-from studio.body.subject import Subject, fit_subject, write_subject
-from studio.foundations.errors import BodyError
+from studio.body.subject import Subject, fit_subject
+from studio.foundations.words import counted
 from studio.runs.setup.subject_fitting import FittedSubject, keep_subject, replace_subject
 from studio.sessions.provenance import note
-from studio.sessions.session import SUBJECT_NAME, Session, redescribe
+from studio.sessions.session import Session, redescribe
 
-LEAST_HEIGHT, MOST_HEIGHT = 300.0, 3000.0
+NAMED = 3
+"""Lengths that a note names."""
 
 
 def body_of_choice(session: Session, subject: Subject) -> tuple[BodyModel, tuple[str, ...]]:
@@ -20,28 +21,30 @@ def body_of_choice(session: Session, subject: Subject) -> tuple[BodyModel, tuple
 
     Raises BodyError for an unknown body or an impossible height.
     """
-    if subject.height_mm is not None and not LEAST_HEIGHT <= subject.height_mm <= MOST_HEIGHT:
-        raise BodyError(
-            f"A height of {subject.height_mm:g} mm is not a person's.", "Give millimetres, such as 1800."
-        )
     return fit_subject(load_body(subject.body, session.body_folders), subject, session.body_folders)
 
 
 def choose_subject(session: Session, subject: Subject) -> Session:
-    """Make a subject the session's own, so that new runs use its body. Raises as `body_of_choice`."""
+    """Make a subject the session's own, so that new runs use its body; the one before is kept beside it.
+
+    Raises as `body_of_choice`.
+    """
     body_of_choice(session, subject)
-    write_subject(subject, session.path / SUBJECT_NAME)
+    if subject != session.subject():
+        replace_subject(session, subject)
     return _with_body(session, subject.body)
 
 
-def choose_body(session: Session, body: str) -> Session:
-    """Make a body, as large as its file says, the session's own; the subject before, whose measures would change it, is
-    kept as subject-before.toml. Raises BodyError.
-    """
-    subject = Subject(body=body)
-    body_of_choice(session, subject)
-    replace_subject(session, subject)
-    return _with_body(session, body)
+def lengths_left_out(session: Session, chosen: Subject) -> tuple[str, ...]:
+    """Which measured lengths a session's subject has and a chosen one has not, as a note; empty where none is lost."""
+    known = session.subject()
+    lost = sorted(set(known.lengths_mm) - set(chosen.lengths_mm)) if known else []
+    if not lost:
+        return ()
+    names = f"{', '.join(lost[:NAMED])}{' …' * (len(lost) > NAMED)}"
+    return (
+        f"Left out: {counted(len(lost), 'measured length')} ({names}). The subject before is kept beside the new one.",
+    )
 
 
 def keep_fitted(session: Session, fitted: FittedSubject) -> Path:

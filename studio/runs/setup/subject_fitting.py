@@ -24,7 +24,7 @@ from studio.body.subject import REPORTED_SPREAD, SHORTEST_MM, TALLEST_MM, Subjec
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.foundations.arrays import Array
-from studio.foundations.declaring import Body, Seed, Terminal
+from studio.foundations.declaring import Body, Millimetres, Seed, Terminal
 from studio.foundations.errors import RunError
 from studio.foundations.progress import Progress, no_progress
 from studio.runs.problem_source import check_seen
@@ -48,7 +48,12 @@ ANGLE_SPREAD, PLACE_SPREAD = 0.35, 60.0
 """rad and mm: spread of the initial poses."""
 
 
-Height = Annotated[float | None, Field(ge=SHORTEST_MM, le=TALLEST_MM), Terminal("--height")]
+Height = Annotated[
+    float | None,
+    Field(ge=SHORTEST_MM, le=TALLEST_MM),
+    Millimetres(SHORTEST_MM, TALLEST_MM),
+    Terminal("--height"),
+]
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from studio.body.scale import longest_side, rest_height
+from studio.body.subject import Subject
 from studio.footage.calibration.checks import check_calibration
 from studio.footage.calibration.rig_checks import NO_FLOOR, TILTED, UNIT, room_findings
 from studio.foundations.errors import StudioError
@@ -124,6 +125,9 @@ def calibration_step(session: Session) -> StepStatus:
     )
 
 
+NOT_LOOKED_AT = "Its masks were not set up yet: look whether they show the subject."
+
+
 def background_step(session: Session) -> StepStatus:
     """The masks: given, or from a background that was set; their measured quality."""
     sources = session.manifest.footage.cameras
@@ -146,7 +150,12 @@ def background_step(session: Session) -> StepStatus:
         words = "background from the footage"
     if known is None:
         is_set = given or plates == len(sources) or bool(read_evidence(session).knobs)
-        return StepStatus("background", "done" if is_set else "ready", words)
+        why = "" if given else NOT_LOOKED_AT
+        return (
+            StepStatus("background", "done", words, why)
+            if is_set
+            else StepStatus("background", "ready", words)
+        )
     words = known.words or words
     stale = _stale(session, "background", words, "Measured with")
     if stale is not None:
@@ -186,11 +195,18 @@ def subject_step(session: Session) -> StepStatus:
     stands = _standing_mm(session) if known else given
     parts = [subject.body if subject else session.manifest.body]
     parts += [f"{stands / 1000:.2f} m"] if stands and given else []
-    parts += ["fitted to the footage"] if known else ["by height"] if given else ["measures given"]
-    if subject and not (known or given or subject.lengths_mm or subject.dimensions_mm or subject.ratios):
-        parts[-1] = "as its file says"
+    parts += ["fitted to the footage" if known else _measures_in_words(subject)]
     words = ", ".join(parts)
     return _stale(session, "subject", words, "Fitted with") or StepStatus("subject", "done", words)
+
+
+def _measures_in_words(subject: Subject | None) -> str:
+    """What is known of a subject's size."""
+    if subject and subject.lengths_mm:
+        return f"by {counted(len(subject.lengths_mm), 'measured length')}"
+    if subject and (subject.dimensions_mm or subject.ratios):
+        return "measures given"
+    return "by height" if subject and subject.height_mm else "as its file says"
 
 
 MAY_FACE_BACK = "It may face the other way: check left and right before you track."
@@ -230,7 +246,7 @@ class ExportedFile:
     stale: str = ""
 
 
-NOT_EVERYWHERE = "It does not fit everywhere: check the marked frames."
+NOT_EVERYWHERE = "It does not fit everywhere: look at the frames that step Check names."
 
 
 def newest_run(session: Session) -> StoredRun | None:

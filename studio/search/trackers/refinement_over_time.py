@@ -65,9 +65,9 @@ class Window:
 class MovementRefiner:
     """Refines the poses of frames that follow each other."""
 
-    def __init__(self, refiner: Refiner, fps: float, acceleration: float) -> None:
-        """acceleration : σ_a, m/s², above 0."""
-        self._refiner, self._body = refiner, refiner.body
+    def __init__(self, refiner: Refiner, fps: float, acceleration: float, still: Sequence[int] = ()) -> None:
+        """acceleration : σ_a, m/s², above 0. still : numbers of parameters that stay as they are."""
+        self._refiner, self._body, self._still = refiner, refiner.body, list(still)
         usual = acceleration * 1000.0 / fps**2
         self._weight = (RESIDUAL_MM / usual) ** 2 / len(body_points(self._body, refiner.body.neutral)[0])
 
@@ -133,6 +133,7 @@ class MovementRefiner:
         held = ((poses <= refiner.lower) & (here.gradient > 0.0)) | (
             (poses >= refiner.upper) & (here.gradient < 0.0)
         )
+        held[:, self._still] = True
         free = np.where(held, 0.0, 1.0)
         diagonal = np.einsum("tii->ti", here.blocks[0])
         lift = damping * diagonal + 1e-9 * diagonal.mean() + 1e-12

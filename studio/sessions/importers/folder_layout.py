@@ -539,8 +539,9 @@ def _calibration(source: Path, places: tuple[Path, ...], choice: Path | str | No
         )
     raise CalibrationError(
         f"'{source.name}' holds no calibration that can be read.",
-        "Put a TOML of Pose2Sim, aniposelib, FreeMoCap or Caliscope, EasyMocap's or OpenCV's YAML, a Qualisys .qca.txt"
-        " or Bouguet .cal files into 'calibration/'; for a trial of several, import the folder above with --trial.",
+        "Give its file with --calibration FILE, or put a TOML of Pose2Sim, aniposelib, FreeMoCap or Caliscope,"
+        " EasyMocap's or OpenCV's YAML, a Qualisys .qca.txt or Bouguet .cal files into 'calibration/'. Where the folder"
+        " above has it, import that one, with --trial NAME if it holds several trials.",
     )
 
 

@@ -15,11 +15,16 @@ from pydantic import Field
 
 from studio.footage.calibration.checks import blocking, check_calibration
 from studio.footage.calibration.rig_checks import has_room, room_findings
-from studio.footage.capture.calibration_files import UNIT_PATTERN, Calibration, read_calibration
+from studio.footage.capture.calibration_files import (
+    UNIT_PATTERN,
+    Calibration,
+    is_calibration,
+    read_calibration,
+)
 from studio.footage.capture.footage_source import CameraSource, FootageSource
 from studio.footage.capture.naming import CameraMatch, listed
-from studio.footage.capture.pictures import check_picture, list_pictures
-from studio.footage.capture.video import probe_video
+from studio.footage.capture.pictures import check_picture, is_picture, list_pictures
+from studio.footage.capture.video import VIDEO_SUFFIXES, probe_video
 from studio.foundations.declaring import Terminal, Web
 from studio.foundations.errors import CalibrationError, FootageError, SessionError
 from studio.foundations.foreign_files import MANIFEST_NAME, leads_out
@@ -155,7 +160,8 @@ class ImportOptions:
     allow_inconsistent: Annotated[
         bool,
         Field(
-            description="Take a calibration that would make results wrong (z not up, a wrong unit), with a warning."
+            description="Take a calibration that would make results wrong (z not up, metres taken for millimetres) with"
+            " a warning. A unit that is named is believed without this: a doubt of it only warns."
         ),
     ] = False
     copy: Annotated[
@@ -316,6 +322,8 @@ def _add(session: Session, source: Path, options: ImportOptions, report: Progres
 def _check_request(source: Path, options: ImportOptions) -> None:
     """Check the options before the source is opened. Raises FootageError."""
     packed = source.is_file() and is_archive(source)
+    if source.is_file() and not packed:
+        raise _single_file(source)
     if not source.is_dir() and not packed:
         raise FootageError(
             f"There is no folder '{source}', nor an archive.",
@@ -327,6 +335,23 @@ def _check_request(source: Path, options: ImportOptions) -> None:
         )
     if options.fps is not None and not (math.isfinite(options.fps) and 0.0 < options.fps <= FASTEST):
         raise FootageError(f"{options.fps:g} is no frame rate.", "Give frames per second, such as --fps 60.")
+
+
+def _single_file(source: Path) -> FootageError:
+    """Why a file that is no archive is no source, with what to give instead."""
+    if source.suffix.lower() in VIDEO_SUFFIXES:
+        kind = "one camera's video"
+        remedy = "Give the folder that holds a video a camera, with a calibration in it or with --calibration FILE."
+    elif is_picture(source):
+        kind = "a picture"
+        remedy = "Give the folder that holds one folder of pictures a camera, and a calibration."
+    elif is_calibration(source):
+        kind = "a calibration"
+        remedy = f"Give the folder that holds the footage, and this file with it: --calibration {source}."
+    else:
+        kind = "a file"
+        remedy = "Give the folder that holds the footage and its calibration, or a zip or tar of it."
+    return FootageError(f"'{source}' is {kind}, and no folder of footage.", remedy)
 
 
 def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> SourcePlan:
@@ -351,7 +376,7 @@ def _checked_rig(measured: MeasuredSource, options: ImportOptions, size_mm: floa
     Raises CalibrationError with the first finding that would make results wrong, unless `allow_inconsistent`.
     """
     cameras = tuple(entry.camera for entry in measured.cameras)
-    findings = check_calibration(cameras)
+    findings = check_calibration(cameras, up=options.up)
     if has_room(cameras, size_mm):
         findings = tuple(finding for finding in findings if finding.code != "scale")
     elif options.unit:

@@ -3,8 +3,10 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from patched_ball import FRAMES, patched_ball
@@ -16,10 +18,11 @@ from web_doubles import Studio
 from studio.evidence.strokes import Stroke
 from studio.foundations.errors import FootageError
 from studio.operations import masks
+from studio.operations.masks import background_of
 from studio.runs.setup.background_setup import BackgroundSetup
 from studio.sessions.background_files import SessionEvidence, read_evidence, write_evidence
 from studio.sessions.footage_changes import change_footage
-from studio.sessions.session import Session
+from studio.sessions.session import Session, redescribe
 from studio.sessions.stroke_files import write_strokes
 
 PLACE = "/api/sessions/take1"
@@ -104,6 +107,19 @@ def test_a_failure_leaves_backgrounds_as_they_were(studio: Studio, monkeypatch: 
     studio.post(f"{PLACE}/background", {"source": "median"})
     assert studio.ended(f"{PLACE}/background", "job")["message"] == "The clip ends."
     assert not (studio.workspace.session("take1").path / "evidence.json").exists()
+
+
+@pytest.mark.parametrize("ending", ["png", "mp4"])
+def test_an_animal_is_cut_out_before_pictures_or_clips_of_its_empty_place(
+    studio: Studio, ending: str
+) -> None:
+    session = studio.workspace.session("take1")
+    footage = session.manifest.footage
+    cameras = tuple(replace(one, background=f"background/{one.name}.{ending}") for one in footage.cameras)
+    before = background_of(session)
+    changed = replace(footage, cameras=cameras)
+    found = background_of(redescribe(session, msgspec.structs.replace(session.manifest, footage=changed)))
+    assert ("animal" in before.possible, "animal" in found.possible) == (False, True)
 
 
 def test_uploaded_plates_are_matched_by_name_or_as_said(studio: Studio) -> None:

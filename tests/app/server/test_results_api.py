@@ -58,6 +58,7 @@ def test_with_truth_every_frame_has_its_error(studio: Studio, session: Session, 
     assert measured["frames"] == [0, 1]
     [line] = studio.get("/api/sessions/take1/runs")["runs"]
     assert np.isclose(line["mean_mm"], 30.0, atol=0.01)
+    assert line["measured_frames"] == 2
 
 
 def test_lost_limbs_are_marked(studio: Studio, session: Session, tracked: StoredRun) -> None:

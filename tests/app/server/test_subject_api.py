@@ -10,8 +10,9 @@ import pytest
 from waiting import PATIENCE
 from web_doubles import Studio
 
-from studio.foundations.errors import RunError
+from studio.foundations.errors import RunError, SettingsError
 from studio.operations import person
+from studio.operations.person import subject as write_subject
 from studio.runs.setup.subject_fitting import FitRequest, FittedSize, FittedSubject, Shown
 from studio.sessions.session import Session
 
@@ -69,7 +70,12 @@ def test_a_height_gives_every_length(studio: Studio) -> None:
     assert tall["height_mm"] == 2000
     assert tall["dimensions"]["left_thigh_length"] == pytest.approx(0.245 * 2000)
     assert small["left_thigh_length"] == pytest.approx(0.245 * 1600)
-    studio.put(place, {"height_mm": 18}, code=422)
+    refused = studio.put(place, {"height_mm": 164.5}, code=422)
+    assert "'height_mm': 164.5 mm is not from 300 to 3000 mm. It looks like centimetres: write 1645" in str(
+        refused
+    )
+    with pytest.raises(SettingsError, match="It looks like centimetres"):
+        write_subject(studio.workspace.session(SESSION), 164.5)
 
 
 def test_what_is_painted_does_not_count(studio: Studio) -> None:
