@@ -199,11 +199,15 @@ def slider_range(knob: Knob, value: Value) -> tuple[float, float, float]:
     return round(start, 9), round(end, 9), step
 
 
+WHILE_TRACKED = " of a run that is being tracked; else the frame that is shown is searched again at once"
+
+
 def _make(gui: viser.GuiApi, knob: Knob, value: Value) -> viser.GuiInputHandle[Any]:
-    default = in_words(knob, knob.default)
-    hint = f"{knob.help} Default {default}; {allowed(knob)}. Takes effect: {knob.takes_effect}."
+    default, is_movable = in_words(knob, knob.default), knob.takes_effect != "new run"
+    when = f"{knob.takes_effect}{WHILE_TRACKED * is_movable}"
+    hint = f"{knob.help} Default {default}; {allowed(knob)}. Takes effect: {when}."
     label = title(knob, value != knob.default)
-    more: dict[str, Any] = {"hint": hint, "disabled": knob.takes_effect == "new run"}
+    more: dict[str, Any] = {"hint": hint, "disabled": not is_movable}
     if knob.kind is bool:
         return gui.add_checkbox(label, bool(value), **more)
     if knob.choices:
