@@ -254,3 +254,17 @@ def test_every_other_page(window: StudioPage, studio: StudioServer) -> None:
         window.page.goto(f"{studio.origin}{address}")
         window.page.locator(part).first.wait_for()
         check(window, address, widths=WIDTHS)
+
+
+def test_a_choice_with_long_words_stays_in_its_card(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.goto(f"{studio.origin}/reports")
+    choice = page.get_by_label("Experiment", exact=True)
+    choice.wait_for()
+    page.set_viewport_size({"width": 390, "height": USUAL["height"]})
+    try:
+        assert choice.evaluate(
+            "one => one.getBoundingClientRect().right < one.closest('.card-box').getBoundingClientRect().right"
+        )
+    finally:
+        page.set_viewport_size(USUAL)

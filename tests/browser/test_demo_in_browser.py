@@ -382,6 +382,16 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
         for scene in ("#scene", ".tried-scene")
     ]
     assert boxes[0] == pytest.approx(boxes[1], abs=1.0), "both are seen alike"
+    # Where the scene is narrow, the knobs lie over what was tried, too, and can be moved on.
+    paused.page.set_viewport_size({"width": 480, "height": 800})
+    knobs = paused.page.get_by_role("button", name="Knobs", exact=True)
+    knobs.click()
+    paused.scene.get_by_text("survival rate").first.click(trial=True)
+    knobs.click()
+    paused.scene.get_by_text("survival rate").first.wait_for(state="hidden")
+    expect(paused.page.locator(".twin-box")).to_have_css("clip-path", "none")
+    paused.page.set_viewport_size({"width": 1280, "height": 800})
+    paused.page.locator(".twin-box .divider").wait_for()
     paused.page.locator("#trial", has_text=f"Frame {frame} tried again, not stored").wait_for()
     assert paused.studio.get(f"{run_path(paused)}/frames/{frame}") == stored
 

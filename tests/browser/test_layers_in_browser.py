@@ -102,6 +102,13 @@ def test_layers_are_played_stepped_and_left(
     page.reload()
     window.until("get('plays') === 'layers' && get('layer') === 3")
     window.until("get('layer') === 1")
+    # The space bar pauses what plays, and the frames stay where they are.
+    window.key(" ")
+    expect(button).to_have_attribute("aria-label", "Play layers")
+    expect(page.locator("#play")).to_have_attribute("aria-label", "Play")
+    assert window.get("frame") == 0
+    window.key("Shift+Space")
+    window.until("get('plays') === 'layers'")
     # A drag scrubs, and what plays stops.
     box = page.locator(TILES).nth(LAYERS).bounding_box()
     assert box

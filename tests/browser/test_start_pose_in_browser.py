@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
+from scene_wire import until
 from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import true_poses
@@ -30,7 +31,19 @@ def test_a_start_pose_is_made_better_and_edited(browser: Browser, studio: Studio
     page = window.page
     page.goto(f"{studio.origin}/way?session=toy&step=start-pose")
     page.get_by_text("The session has a start pose, of frame 0.").wait_for()
-    page.get_by_alt_text("front, frame 0, start pose").wait_for()
+    picture = page.get_by_alt_text("front, frame 0, start pose")
+    picture.wait_for()
+    # It opens large, as it is stored, by a click and by Enter, and Escape leads back to it.
+    until(page, lambda: picture.evaluate("image => image.naturalHeight > 0"))
+    large = page.locator("dialog.large-view img")
+    for act in (picture.click, lambda: page.keyboard.press("Enter")):
+        act()
+        until(page, lambda: large.evaluate("image => image.naturalHeight > 0"))
+        assert "height=" not in str(large.get_attribute("src"))
+        page.keyboard.press("Escape")
+        large.wait_for(state="detached")
+        expect(picture).to_be_focused()
+    assert page.url.endswith("step=start-pose")
     before = studio.get(POSE)["pose"]
     page.get_by_role("button", name="Refine from here").click()
     page.get_by_text("Improved:").wait_for()

@@ -519,6 +519,60 @@ def test_a_trial_is_drawn_beside_the_stored_discarded_and_taken_back(
     window.until("get('trial') === null")
 
 
+def test_a_trial_of_fewer_layers_is_counted_as_it_is_shown(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    page.bring_to_front()
+    show(window, "variance")
+    fewer = LAYERS - 2
+    studio.patch(f"{RUN}/settings?frame={FRAME}", {"layers": fewer})
+    window.until(f"get('trial') && get('whatIf')?.length === {fewer} && get('trials')")
+    words, readout = page.locator("#layer-label"), page.locator("#panel-views .readout")
+    window.key("Shift+ArrowRight")
+    expect(words).to_contain_text(f"layer 1 of {fewer}")
+    expect(readout).to_contain_text(re.compile(r", layer 1: stored: variance .*; tried: variance "))
+    # A layer that only what is stored has: named as that, in its own column.
+    page.evaluate(SET, {"layer": LAYERS - 1})
+    expect(words.locator("span")).to_have_text(f"layer {LAYERS} of {LAYERS}")
+    expect(words.locator("small")).to_have_text(f"stored only; tried: {fewer}")
+    expect(readout).to_contain_text(
+        re.compile(rf", layer {LAYERS}: stored: variance .*; tried: no such layer")
+    )
+    window.key("Shift+ArrowLeft")
+    window.until(f"get('layer') === {fewer - 1}")
+    # While layers play the strip says which one is shown.
+    window.key("Shift+Space")
+    window.until("get('plays') === 'layers' && get('layer') === 0")
+    for _ in range(20):
+        expect(words.locator("span")).to_have_text(re.compile("^layer "), timeout=100)
+        page.wait_for_timeout(50)
+    window.key(" ")
+    window.until("get('plays') === null")
+    page.locator("#trial").get_by_role("button", name="Put back", exact=True).click()
+    window.until("get('trial') === null")
+
+
+def test_a_heading_stays_inside_its_sheet_and_off_the_one_beside_it(window: StudioPage) -> None:
+    wide, narrow = window.page.evaluate(
+        """async () => {
+          const { Sheet, categories, numbers } = await import('/assets/js/view_sheet.js');
+          const axes = () => ({ x: categories(['1'], ''), y: numbers() });
+          return [540, 380].map((left) => {
+            const sheet = new Sheet(left + 110);
+            sheet.plot({ left: 300, width: 100, height: 100 }, { title: 'After noise', ...axes() });
+            const title = 'left clavicle forward and backward';
+            sheet.plot({ left, width: 100, height: 100 }, { title, ...axes() });
+            const drawn = sheet.option.title.map(({ text }) => text.slice(3, -1));
+            return { width: sheet.width, places: sheet.headings, drawn };
+          }); }"""
+    )
+    for sheet in (wide, narrow):
+        first, second = sheet["places"]
+        assert second["right"] <= sheet["width"]
+        assert second["left"] >= first["right"]
+    assert wide["drawn"][1] == "left clavicle forward and backward"
+    assert narrow["drawn"][1].endswith("…")
+
+
 def test_words_of_lines_do_not_cover_each_other_and_limbs_keep_their_looks(window: StudioPage) -> None:
     places = window.page.evaluate(
         """async () => {

@@ -319,6 +319,13 @@ export function showPicture(image, address) {
 
 // Words.
 
+/**
+ * In how many of its frames a track was measured, where it was not in all; begins with a space.
+ * @param {number} measured @param {number} all
+ */
+export const partWords = (measured, all) =>
+  measured < all ? ` in ${measured} of ${all} frames` : "";
+
 /** Seconds as text. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined) return "";

@@ -1,7 +1,7 @@
 // Layers on the axes of the views: counted within their search, whose name stands beside them where
 // a frame has several (a run's first frame has).
 
-import { searchName } from "./studio/shown_layers.js";
+import { layerWords, searchName } from "./studio/shown_layers.js";
 import { categories } from "./view_sheet.js";
 
 /**
@@ -22,6 +22,15 @@ export const layerNumber = (layer, /** @type {Counted} */ { searchLayers }) =>
 /** A layer in words: "layer 4", and which search it is of where the frame has several. */
 export const layerInSearch = (layer, /** @type {Counted} */ at) =>
   `layer ${layerNumber(layer, at)}${at.searches > 1 ? ` of the ${searchName(Math.floor(layer / at.searchLayers))}` : ""}`;
+
+/**
+ * A layer in words, with how many there are: "layer 4 of 10". Beside a trial, which may have more or
+ * fewer layers than what is stored, without: "layer 4".
+ * @param {number} layer
+ * @param {Counted & { tried?: any }} at
+ */
+export const layerOfSides = (layer, at) =>
+  at.tried ? layerInSearch(layer, at) : layerWords(layer, at);
 
 /**
  * An axis of layers. A value is a layer's number, counted through from 1 (`layerValue`); beside the
@@ -71,8 +80,11 @@ export function onOneAxis(stored, tried) {
   const searchLayers = Math.max(...sides.map((one) => one.counted.searchLayers));
   const searches = Math.max(...sides.map((one) => one.counted.searches));
   const own = (tried ?? stored).counted.searchLayers;
+  // Of a single search a layer stays where it is, also one that only the longer side has.
   const moved = (layer, from) =>
-    Number.isInteger(layer) ? Math.floor(layer / from) * searchLayers + (layer % from) : layer;
+    Number.isInteger(layer) && searches > 1
+      ? Math.floor(layer / from) * searchLayers + (layer % from)
+      : layer;
   const put = ({ tables, counted: { searchLayers: from } }) =>
     from === searchLayers
       ? tables

@@ -112,6 +112,7 @@ export function stepLayer(by) {
   const count = layersShown();
   if (!count) return;
   const at = get("layer");
-  const next = at === null ? (by > 0 ? 0 : count - 1) : at + by;
+  // From a layer that only the stored frame has, the one before is the last of those tried.
+  const next = at === null ? (by > 0 ? 0 : count - 1) : Math.min(at, count) + by;
   select({ layer: next < 0 || next >= count ? null : next });
 }

@@ -9,6 +9,7 @@ import { findJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { BoardForm, boardOf } from "./setup_boards.js";
 import { batch, html, into, signal, useEffect, useRef, useState } from "./studio/component.js";
+import { opensLarge } from "./studio/dialogs.js";
 import { Action, Check, Failure, Progress, Select } from "./studio/parts.js";
 import { uploadFiles } from "./uploading.js";
 
@@ -19,7 +20,10 @@ const TABS = { file: "From a file", boards: "From a board", used: "In use" };
 const UNITS = [
   ["", "as the file says"],
   ["mm", "millimetres"],
+  ["cm", "centimetres"],
   ["m", "metres"],
+  ["in", "inches"],
+  ["board", "squares of a board"],
 ];
 /** @type {[string, string][]} */
 const AXES = [
@@ -228,6 +232,7 @@ export function modelOf(setup, loaded) {
 /** @param {{ model: Model }} properties */
 function FileForm({ model }) {
   const { path, unit, up } = model.file.value;
+  const [kind, square] = (unit ?? "").split("=");
   // A unit or an axis that is corrected is seen at once.
   const correct = (/** @type {Record<string, string>} */ changes) => {
     model.enter(changes);
@@ -261,9 +266,22 @@ function FileForm({ model }) {
         label="Unit"
         title="Lengths in the file"
         options=${UNITS}
-        value=${unit}
-        take=${(unit) => correct({ unit })}
+        value=${kind}
+        take=${(unit) => (unit === "board" ? model.enter({ unit: "board=" }) : correct({ unit }))}
       />
+      ${
+        kind === "board" &&
+        html`<label>
+          A square (mm)
+          <input
+            type="number"
+            min="0.1"
+            step="any"
+            value=${square}
+            onChange=${({ target }) => target.value && correct({ unit: `board=${target.value}` })}
+          />
+        </label>`
+      }
       <${Select}
         label="Points up"
         title="The axis of the file's world that points up"
@@ -422,6 +440,7 @@ function AxesPicture({ address, camera }) {
   return html`<figure class="picture axes-picture">
     <img
       alt=${`Floor and axes on the picture of ${camera.name}`}
+      ...${opensLarge(camera.name)}
       src=${address}
       hidden=${isMissing}
       onLoad=${() => setMissing(false)}
@@ -441,6 +460,7 @@ function AxesPicture({ address, camera }) {
 const Coverage = ({ at, lens }) => html`<figure class="picture coverage">
   <img
     alt=${`Where the board was seen by ${lens.name}`}
+    ...${opensLarge(`Where the board was seen by ${lens.name}`)}
     src=${`${at}/coverage/${encodeURIComponent(lens.name)}.png`}
   />
   <figcaption>

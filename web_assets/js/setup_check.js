@@ -2,7 +2,7 @@
 // track is exported.
 
 import { fetchJson, post, remove, runPath } from "./api.js";
-import { percent } from "./elements.js";
+import { partWords, percent } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { ViewWall } from "./setup_views.js";
@@ -215,13 +215,13 @@ function verdictOf(check) {
   const under =
     covered === null
       ? ""
-      : `, ${percent(covered)} of the masks under the model: where it is little, a limb is elsewhere`;
+      : `, and ${percent(covered)} of the masks under the model (the rest is a limb that is elsewhere)`;
   const [turns, jumps] = [check.turned.length, check.jumps.length];
   const parts = [
-    check.good ? "The motion fits the pictures." : "Check the marked frames.",
+    check.good ? "The motion fits the pictures." : "Look at the frames below.",
     `${percent(check.inside_mean)} of the model lies in the masks${under}.`,
     turns
-      ? `The body turns round suddenly ${turns} times: left and right may be exchanged.`
+      ? `The body turns round suddenly ${turns === 1 ? "once" : `${turns} times`}: left and right may be exchanged.`
       : "No sudden turn: left and right were not exchanged.",
     jumps &&
       `A limb jumps ${jumps === 1 ? "once" : `${jumps} times`}: it was lost or taken for another.`,
@@ -359,7 +359,9 @@ function Better({ model }) {
       rows=${tracks.map((line) => [
         html`<${TrackChoice} model=${model} line=${line} />`,
         millimetres(line.jitter_mm),
-        ...(hasTruth ? [millimetres(line.mean_mm)] : []),
+        ...(hasTruth
+          ? [`${millimetres(line.mean_mm)}${partWords(line.measured_frames, line.frames)}`]
+          : []),
       ])}
     />
     ${problem && html`<p class="notice">How far the tracks are from the truth is not known. ${problem}</p>`}

@@ -6,6 +6,7 @@ import { complain, say } from "./messages.js";
 import { AddingForm, addingOf } from "./setup_adding.js";
 import { Synchronisation, synchronyOf } from "./setup_synchrony.js";
 import { batch, html, signal, useEffect, useState } from "./studio/component.js";
+import { opensLarge } from "./studio/dialogs.js";
 import { Action, Table } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -111,6 +112,7 @@ function CameraPicture({ model, frame, camera }) {
     <img
       src=${`${address}?height=${THUMB_HEIGHT}&age=${model.age.value}`}
       alt=${isBroken ? `The footage of ${name} cannot be read.` : `Camera ${name}`}
+      ...${opensLarge(`${name}, frame ${frame}`)}
       onLoad=${() => setBroken(false)}
       onError=${() => setBroken(true)}
     />

@@ -4,6 +4,7 @@
 import { sessionPath } from "./api.js";
 import { agreementOf } from "./setup_quality.js";
 import { batch, html, into, signal, useEffect, useRef, useState } from "./studio/component.js";
+import { opensLarge } from "./studio/dialogs.js";
 import { Action, Check } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -160,6 +161,7 @@ function MaskPicture({ shown, camera, quality, exclude, paint }) {
     <img
       ref=${image}
       alt=${`Mask of ${camera.name}`}
+      ...${opensLarge(`${camera.name}, frame ${shown.frame.value}`)}
       onLoad=${() => done(false)}
       onError=${() => done(true)}
     />

@@ -7,6 +7,7 @@ import { findJob, followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { SceneFrame } from "./setup_views.js";
 import { attempting, html, into, signal, useEffect, useState } from "./studio/component.js";
+import { opensLarge } from "./studio/dialogs.js";
 import { Action, Failure, Progress } from "./studio/parts.js";
 import { foundWords } from "./studio/start_pose.js";
 
@@ -348,6 +349,7 @@ function PosePicture({ name, frame, words, address }) {
   return html`<figure class=${isWaiting ? "picture redrawn" : "picture"}>
     <img
       alt=${`${name}, frame ${frame}${words}`}
+      ...${opensLarge(`${name}, frame ${frame}${words}`)}
       loading="lazy"
       src=${address}
       onLoad=${() => setDrawn(address)}

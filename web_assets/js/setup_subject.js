@@ -8,6 +8,7 @@ import { complain } from "./messages.js";
 import { FilmPanel, LandmarkClicks, landmarksOf } from "./setup_landmarks.js";
 import { Stature } from "./setup_stature.js";
 import { batch, html, into, signal, useState } from "./studio/component.js";
+import { opensLarge } from "./studio/dialogs.js";
 import { Action, Failure, Progress, Select, Table } from "./studio/parts.js";
 
 /** @import { Schemas } from "./api_types" */
@@ -17,6 +18,7 @@ const PREVIEW_MILLISECONDS = 150;
 const USUAL_HEIGHT = 1750;
 const LEAST_METRES = 0.3;
 const MOST_METRES = 3;
+const isHeight = (/** @type {number} */ metres) => metres >= LEAST_METRES && metres <= MOST_METRES;
 const PICTURE_HEIGHT = 300;
 
 /** @param {(number | null)[] | null} values */
@@ -195,12 +197,14 @@ function Height({ model }) {
     setTyped(input.value);
     if (input.value !== "" && input.checkValidity()) model.size(Number(input.value) * 10);
   };
-  // "1.80" is metres: no person is that many centimetres tall.
+  // "1.80" is metres, "1800" millimetres: no person is that many centimetres tall.
   const settle = ({ target }) => {
-    const metres = Number(target.value);
-    if (metres < LEAST_METRES || metres > MOST_METRES) return;
-    target.value = String(Math.round(1000 * metres) / 10);
-    take(target);
+    if (target.checkValidity()) return;
+    const metres = [1, 0.001].map((unit) => unit * Number(target.value)).find(isHeight);
+    if (metres) {
+      target.value = String(Math.round(1000 * metres) / 10);
+      take(target);
+    } else target.reportValidity();
   };
   return html`<label>
     Height (cm)
@@ -209,7 +213,7 @@ function Height({ model }) {
         type="number"
         min="30"
         max="300"
-        step="0.5"
+        step="0.1"
         placeholder="unknown"
         aria-label="Height in centimetres"
         value=${typed}
@@ -399,6 +403,7 @@ function FitPictures(/** @type {{ model: Model, fit: Fit }} */ { model, fit }) {
       return html`<figure key=${frame} class="picture">
         <img
           alt=${`Frame ${frame}, ${camera}`}
+          ...${opensLarge(`Frame ${frame}, ${camera}`)}
           src=${`/api/subject-fits/${fit.identifier}/${view}?height=${PICTURE_HEIGHT}&look=${fit.looks}`}
         />
         <figcaption>

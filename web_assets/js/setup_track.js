@@ -2,7 +2,7 @@
 // are found.
 
 import { fetchJson, post, remove, runPath, sessionPath } from "./api.js";
-import { dotted, duration } from "./elements.js";
+import { dotted, duration, partWords } from "./elements.js";
 import { listen } from "./events.js";
 import { findJob, followJob, isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
@@ -242,7 +242,9 @@ function Status({ model }) {
   const backwards =
     `The run begins in frame ${run.first}. The frames before it are tracked backwards from there, ` +
     `into a new run; ${run.name} stays.`;
-  const truth = run.mean_mm != null && `, ${run.mean_mm.toPrecision(3)} mm from the truth`;
+  const truth =
+    run.mean_mm != null &&
+    `, ${run.mean_mm.toPrecision(3)} mm from the truth${partWords(run.measured_frames, run.done)}`;
   const isFailed = model.isHere() && ["failed", "lost"].includes(work.state);
   return html`<section class="track-status">
     <p>${run.name}: ${run.done} of ${count} frames${from}, ${run.describe}${truth}.</p>

@@ -7,11 +7,10 @@ import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
 import { studioPath } from "./sessions.js";
 import { html, useEffect, useLayoutEffect, useRef, useState } from "./studio/component.js";
-import { openPicture } from "./studio/dialogs.js";
+import { opensLarge } from "./studio/dialogs.js";
 import { Check } from "./studio/parts.js";
 
 const HEIGHT = 420;
-const LARGE = 1080;
 
 /** The 3-D scene. */
 export function SceneFrame({ kind = "" }) {
@@ -28,11 +27,7 @@ function View({ name, address, note }) {
   const newest = address(HEIGHT);
   useEffect(() => showPicture(image.current, newest), [newest]);
   return html`<figure class="picture">
-    <img
-      ref=${image}
-      alt=${`View of ${name}`}
-      onClick=${() => openPicture(name, () => address(LARGE))}
-    />
+    <img ref=${image} alt=${`View of ${name}`} ...${opensLarge(name)} />
     <figcaption><b>${name}</b>${note && html`<span class=${note.kind}>${note.words}</span>`}</figcaption>
   </figure>`;
 }

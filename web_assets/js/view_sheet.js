@@ -43,6 +43,14 @@ function shortened(text, width) {
   return 2 * kept.length > text.length ? `${kept.replace(/[,;]$/, "")}…` : "";
 }
 
+/** A text as it is where it takes at most `width` pixels, else its beginning with an ellipsis. */
+function fitted(text, width) {
+  let kept = text;
+  while (kept.length > 1 && pen.measureText(kept === text ? text : `${kept}…`).width > width)
+    kept = kept.slice(0, -1).trimEnd();
+  return kept === text ? text : `${kept}…`;
+}
+
 /** A sheet of `width` pixels that grows with what is put on it. */
 export class Sheet {
   /** @type {Record<string, any>} */
@@ -64,6 +72,8 @@ export class Sheet {
    * @type {{ box: Box, index: number, act: (x: number, y: number) => Changes | null }[]}
    */
   grounds = [];
+  /** Where headings stand, pixels. @type {{ left: number, right: number, top: number }[]} */
+  headings = [];
   height = 0;
 
   constructor(width) {
@@ -200,12 +210,25 @@ export class Sheet {
     this.option.series.at(-1).isFrame = true;
   }
 
-  /** A heading of a plot. */
-  heading(text, whole, left, top, width = Infinity) {
+  /**
+   * A heading of a plot. One that is wider than the sheet has room for begins farther left, as far as
+   * the heading beside it allows, and is shortened where that is not enough.
+   */
+  heading(words, whole, left, top, width = Infinity) {
+    pen.font = `600 ${typeSize(12)}px ${FAMILY}`;
+    const besides = this.headings.filter((one) => one.top === top && one.left < left);
+    const first = Math.max(0, ...besides.map((one) => one.right + KEY_GAP));
+    const most = this.width - KEY_GAP;
+    const beyond = left + pen.measureText(words).width - most;
+    const start = Math.max(Math.min(first, left), left - Math.max(0, beyond));
+    const text = fitted(words, most - start);
+    const end = start + pen.measureText(text).width;
     pen.font = `11px ${FAMILY}`;
-    const unit = shortened(whole, width - 1.16 * pen.measureText(text).width - 12);
+    const unit = shortened(whole, width - (end - left) - 12);
+    const right = end + (unit ? pen.measureText(unit).width + 12 : 0);
+    this.headings.push({ left: start, right, top });
     this.option.title.push({
-      left: left - 2,
+      left: start - 2,
       top: top + 6,
       text: unit ? `{a|${text}}  {b|${unit}}` : `{a|${text}}`,
       padding: 0,
@@ -466,7 +489,8 @@ export class Sheet {
         const [across, down] = bands[api.value(0)];
         const isColumn = down === null;
         const at = place(isColumn ? x : y, isColumn ? across : down);
-        if (at === undefined || at < 0) return null;
+        const most = (isColumn ? x : y).data?.length ?? Infinity;
+        if (at === undefined || at < 0 || at >= most) return null;
         const [size, middle] = isColumn
           ? [api.size([1, 0])[0], api.coord([at, 0])[0]]
           : [api.size([0, 1])[1], api.coord([0, at])[1]];

@@ -3,8 +3,8 @@
 // off, what the dead had wrong.
 
 import { figure, token } from "./chart_looks.js";
-import { layerAxis, layerInSearch, layerNumber, layerValue } from "./layer_axis.js";
-import { layerWords, searchName } from "./studio/shown_layers.js";
+import { layerAxis, layerInSearch, layerNumber, layerOfSides, layerValue } from "./layer_axis.js";
+import { searchName } from "./studio/shown_layers.js";
 import { layerColour } from "./theme.js";
 import {
   byLayer,
@@ -137,7 +137,7 @@ function varianceOfFrame(sheet, tables, at) {
             .map((entry) => (entry ? figure(entry[name]) : "–"))
             .join(" → ") + ` ${unit}²`;
         const of = row ?? other;
-        return tipOf(`${at.label(parameter)}, ${layerWords(layer, at)}`, [
+        return tipOf(`${at.label(parameter)}, ${layerOfSides(layer, at)}`, [
           ["as weighed", shown("weighed")],
           ["before noise", shown("before")],
           ["after noise", shown("after")],
@@ -187,7 +187,7 @@ function varianceOfFrame(sheet, tables, at) {
       : "no such layer";
     return name ? `${name}: ${what}` : what;
   });
-  return `${at.label(chosen)}, ${layerWords(layer, at)}: ${words.join("; ")}.`;
+  return `${at.label(chosen)}, ${layerOfSides(layer, at)}: ${words.join("; ")}.`;
 }
 
 /** What a line is called, of one of both sides. */
@@ -431,7 +431,7 @@ function scheduleOfFrame(sheet, tables, at) {
   else if (has("acceptance")) sheet.legend(["reached", "moves taken"], columns[0].left, 4, 220);
   const words = sides.map(({ name, tables: own }) => {
     const row = own.layers.find((one) => one.layer === at.layer) ?? own.layers.at(-1);
-    const what = `${layerWords(row.layer, at)}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}${Number.isFinite(row.largest) ? `, largest weight ${figure(100 * row.largest)} %` : ""}${sampledWords(row)}${row.alarm ? `. Alarm: ${row.alarm}` : ""}`;
+    const what = `${layerOfSides(row.layer, at)}: β ${figure(row.beta)}, α asked ${figure(row.alpha_wanted)}, reached ${figure(row.alpha_reached)}, effective number ${figure(row.effective)} of ${row.particles}${Number.isFinite(row.largest) ? `, largest weight ${figure(100 * row.largest)} %` : ""}${sampledWords(row)}${row.alarm ? `. Alarm: ${row.alarm}` : ""}`;
     return name ? `${name}: ${what}` : `L${what.slice(1)}`;
   });
   return `${words.join("; ")}.`;

@@ -725,12 +725,10 @@ class SceneController:
         return seconds * self.model.layers.rate / STEP_RATE if plays else seconds
 
     def _layers_so_far(self) -> int:
-        """How many layers of the shown frame are there, of whatever search is shown here or in the twin."""
+        """How many layers of the shown frame are there: of what was tried where the twin shows it, as on the page."""
         moment, twin = self._moment(), self._twin
-        records = (
-            *(moment.records if moment is not None else ()),
-            *(twin.model.live.records if twin else ()),
-        )
+        tried = twin.model.live.records if twin else ()
+        records = tried or (moment.records if moment is not None else ())
         return max((record.layer + 1 for record in records), default=0)
 
     def _draw(self) -> None:

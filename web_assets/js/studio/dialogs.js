@@ -41,15 +41,20 @@ export function openList(heading, pairs) {
   </div>`);
 }
 
-/** @param {{ caption: string, source: () => string | null }} properties */
-function LargePicture({ caption, source }) {
+/** @param {{ caption: string, source: () => string | null, ratio?: number }} properties */
+function LargePicture({ caption, source, ratio }) {
   const image = useRef(/** @type {HTMLImageElement | null} */ (null));
   const address = source();
   useEffect(() => {
     if (address) showPicture(image.current, address);
   }, [address]);
   return html`<div>
-    <img ref=${image} alt=${caption} />
+    <img
+      ref=${image}
+      alt=${caption}
+      class=${ratio ? "fills" : ""}
+      style=${ratio ? { "--ratio": ratio } : {}}
+    />
     <div class="actions">
       <span class="quiet-text">${caption}</span><span class="spring"></span><${Close} />
     </div>
@@ -60,9 +65,42 @@ function LargePicture({ caption, source }) {
  * A picture as large as the window allows, another whenever its address is.
  * @param {string} caption
  * @param {() => string | null} source its address
+ * @param {number} [ratio] its width by its height: then a small one is enlarged, too
  */
-export const openPicture = (caption, source) =>
-  openDialog(html`<${LargePicture} caption=${caption} source=${source} />`, "large-view");
+export const openPicture = (caption, source, ratio) =>
+  openDialog(
+    html`<${LargePicture} caption=${caption} source=${source} ratio=${ratio} />`,
+    "large-view",
+  );
+
+/**
+ * What makes a picture one that opens large, by a click, Enter or the space bar: attributes of its
+ * <img>. `caption`: stands below it; its address is requested without a height, as it is stored.
+ * @param {string} caption
+ */
+export function opensLarge(caption) {
+  /** @param {Event & { currentTarget: any }} event */
+  const open = ({ currentTarget: image }) => {
+    if (!image.naturalHeight) return;
+    const address = new URL(image.src, location.href);
+    address.searchParams.delete("height");
+    const ratio = image.naturalWidth / image.naturalHeight;
+    openPicture(caption, () => address.href, ratio);
+  };
+  return {
+    tabIndex: 0,
+    role: "button",
+    title: "See it large",
+    onClick: open,
+    onKeyDown: (/** @type {KeyboardEvent & { currentTarget: any }} */ event) => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      // Enter alone would go to the next step.
+      event.preventDefault();
+      event.stopPropagation();
+      open(event);
+    },
+  };
+}
 
 /**
  * A field of a form. `kind`: of its input, or "check", or "file"; `choices`: those of a select, as

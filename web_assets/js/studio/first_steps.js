@@ -70,7 +70,8 @@ function Failing() {
   };
   return html`<p>
       The same pictures, the same start, 500 evaluations a frame each: <b>one layer</b> has lost the
-      walker by frame ${LOST}, <b>ten layers</b> of fifty hold him. The chart has both errors over the frames.
+      walker by frame ${LOST}, <b>ten layers</b> of fifty hold him; with each of ten seeds it is so. The
+      chart has both errors over the frames.
     </p>
     <div class="group" role="group" aria-label="Which run is shown">
       ${[ONE, TEN].map(

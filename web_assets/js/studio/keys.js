@@ -3,7 +3,7 @@
 import { openList } from "./dialogs.js";
 import { lookThrough } from "./cameras.js";
 import { correctFrame, leaveCorrecting } from "./correcting.js";
-import { leavePlayback, toggleLoop, togglePlay } from "./playback.js";
+import { leavePlayback, pauseOrPlay, toggleLoop } from "./playback.js";
 import { enterScene } from "../scene_frame.js";
 import { goTo } from "../selection.js";
 import { get } from "../state.js";
@@ -38,7 +38,7 @@ const MARKS =
  * @type {[string, string, (event: any) => boolean, (event: KeyboardEvent) => unknown][]}
  */
 const KEYS = [
-  ["Space", "play or pause the frames", isArrow(" ", false), togglePlay],
+  ["Space", "pause what plays, else play the frames", isArrow(" ", false), pauseOrPlay],
   ["Shift Space", "play or pause the frame's layers", isArrow(" ", true), toggleLayers],
   ["←", "frame before", isArrow("ArrowLeft", false), () => goTo(get("frame") - 1)],
   ["→", "next frame", isArrow("ArrowRight", false), () => goTo(get("frame") + 1)],

@@ -14,7 +14,14 @@ import { follow, html, mount, signal, useMemo } from "./component.js";
 import { Select } from "./parts.js";
 import { LayerOutline, scaleOf } from "./layer_outline.js";
 import { layerPlayback, playLayers, RATES, scrubTo, toggleLayers } from "./layer_playback.js";
-import { layerWords, searchName, shownLayers, survivorsOf, varianceShare } from "./shown_layers.js";
+import {
+  layerWords,
+  missingLayerWords,
+  searchName,
+  shownLayers,
+  survivorsOf,
+  varianceShare,
+} from "./shown_layers.js";
 
 const PLAY = "M4 2.5v11l9-5.5z";
 const PAUSE = "M4 3h3v10H4zM9 3h3v10H9z";
@@ -45,6 +52,15 @@ function numbersOf(layer) {
   if (survivors === null) parts.push(`${layer.particles} evaluations`);
   else parts.push(`${survivors} of ${layer.particles} survive`);
   return parts.join(" · ");
+}
+
+/** What the strip shows, in words, and what there is to say of it. @returns {string[]} */
+function shownWords(/** @type {number | null} */ chosen) {
+  const { layers, isTrial } = shown.value;
+  if (chosen === null) return ["all layers", isTrial ? "of the frame annealed again" : ""];
+  const layer = layers[chosen];
+  if (!layer) return missingLayerWords(chosen, shown.value);
+  return [layerWords(chosen, shown.value), numbersOf(layer)];
 }
 
 /**
@@ -131,7 +147,6 @@ function Tiles() {
     const from = chosen ?? (by === 1 ? -1 : last + 1);
     scrubTo(to ?? Math.max(0, Math.min(last, from + (by ?? 0))));
   };
-  const now = chosen === null ? null : layers[chosen];
   return html`<div
     class=${`layer-tiles ${searches > 1 ? "searches" : ""}`}
     id="layer-tiles"
@@ -140,8 +155,8 @@ function Tiles() {
     aria-label="Layer"
     aria-valuemin="1"
     aria-valuemax=${Math.max(1, layers.length)}
-    aria-valuenow=${(chosen ?? Math.max(0, layers.length - 1)) + 1}
-    aria-valuetext=${now ? `${layerWords(chosen, shown.value)}, ${numbersOf(now)}` : "all layers together"}
+    aria-valuenow=${Math.max(1, Math.min(layers.length, (chosen ?? Infinity) + 1))}
+    aria-valuetext=${chosen === null ? "all layers together" : shownWords(chosen).join(", ")}
     onPointerDown=${takePointer}
     onPointerMove=${takePointer}
     onKeyDown=${takeKey}
@@ -176,9 +191,8 @@ function Tiles() {
 function Tools() {
   const { playing, rate, mode } = layerPlayback.value;
   const chosen = follow("layer");
-  const { layers, isTrial } = shown.value;
-  const none = !layers.length;
-  const now = chosen === null ? null : layers[chosen];
+  const none = !shown.value.layers.length;
+  const [words, more] = shownWords(chosen);
   const isPingpong = mode === "pingpong";
   const back = isPingpong ? "Forth and back" : "In a loop";
   return html`
@@ -233,8 +247,8 @@ function Tools() {
       </button>
     </div>
     <output class="layer-words" id="layer-label">
-      <span>${now ? layerWords(chosen, shown.value) : "all layers"}</span>
-      <small>${now ? numbersOf(now) : isTrial ? "of the frame annealed again" : ""}</small>
+      <span>${words}</span>
+      <small>${more}</small>
     </output>
   `;
 }

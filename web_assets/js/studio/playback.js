@@ -64,6 +64,12 @@ export function togglePlay() {
   timer = window.setTimeout(tick, 0);
 }
 
+/** Pause what plays, the frames or the layers of one; else play the frames. */
+export function pauseOrPlay() {
+  if (layerPlayback.value.playing) playLayers({ playing: false });
+  else togglePlay();
+}
+
 /** Stop what plays. Whether it did. */
 export function leavePlayback() {
   const was = playing.value;

@@ -3,7 +3,7 @@
 import { readOnly, sessionPath } from "../api.js";
 import { figure } from "../chart_looks.js";
 import { acceptDrops } from "../dropping.js";
-import { byId } from "../elements.js";
+import { byId, partWords } from "../elements.js";
 import { importForm } from "./importing.js";
 import { newRunForm } from "./new_run.js";
 import { lacks, openSession, setupPath, studioPath } from "../sessions.js";
@@ -97,12 +97,14 @@ function Figures({ id, entry, run }) {
   const measured = run.mean_mm !== null && run.mean_mm !== undefined;
   const all = run.last - run.first;
   const partial = run.done < all;
+  const part = partWords(run.measured_frames, run.done);
   const frames = `${countWords(run.done, all)} frames are tracked`;
-  const title = partial ? `${frames}${measured ? ": the mean is of these only" : ""}.` : "";
+  const of = measured && (part ? `the mean is${part}` : partial && "the mean is of these only");
+  const title = [partial && frames, of].filter(Boolean).join(": ");
   const damaged = run.damaged?.length ?? 0;
   const lost = damaged > 0 ? `Frames ${run.damaged.join(", ")} are damaged on the disk` : "";
   return html`<div class="figure">
-    ${measured && html`${figure(run.mean_mm)} <small>${partial ? "mm, partial " : "mm"}</small>`}
+    ${measured && html`${figure(run.mean_mm)} <small title=${title}>${partial || part ? "mm, partial " : "mm"}</small>`}
     ${(partial || !measured) && html`<${Count} id=${id} run=${run} title=${title} />`}
     ${
       damaged > 0 &&

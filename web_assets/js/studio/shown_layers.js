@@ -40,11 +40,24 @@ export const searchName = (search) => `${ORDINALS[search] ?? `${search + 1}th`} 
 /**
  * A layer in words: "layer 4 of 10", and which search it belongs to where a frame has several.
  * @param {number} layer counted through
- * @param {ShownLayers} shown
+ * @param {{ searchLayers: number, searches: number }} counted
  */
 export function layerWords(layer, { searchLayers, searches }) {
   const within = `layer ${(layer % searchLayers) + 1} of ${searchLayers}`;
   return searches > 1 ? `${within}, ${searchName(Math.floor(layer / searchLayers))}` : within;
+}
+
+/**
+ * A chosen layer that is not among those of the shown frame, in words: it is still to come, or what
+ * was tried has fewer than the stored frame beside it.
+ * @param {number} layer counted through
+ * @param {ShownLayers} shown
+ */
+export function missingLayerWords(layer, shown) {
+  if (layer < shown.count) return [layerWords(layer, shown), "still to come"];
+  const stored = layersOf(null, get("detail"), null);
+  const tried = shown.searches > 1 ? `${shown.searchLayers} a search` : `${shown.layers.length}`;
+  return [layerWords(layer, stored), `stored only; tried: ${tried}`];
 }
 
 /**

@@ -1,7 +1,7 @@
 // The run's tracks: which one scene, charts and views show.
 
 import { fetchJson, post, runPath } from "../api.js";
-import { byId } from "../elements.js";
+import { byId, partWords } from "../elements.js";
 import { onEvent } from "../live.js";
 import { complain, say } from "../messages.js";
 import { get, set, watch } from "../state.js";
@@ -22,7 +22,8 @@ export const hasTrack = (name) => tracks.value.some((track) => track.name === na
 
 /** A track in words. @param {string} name */
 export const trackWords = (name) => (name === RAW ? "as searched" : name);
-const errorWords = ({ mean_mm: mean }) => (mean == null ? "" : ` · ${mean.toPrecision(3)} mm`);
+const errorWords = ({ mean_mm: mean, measured_frames: measured, frames }) =>
+  mean == null ? "" : ` · ${mean.toPrecision(3)} mm${partWords(measured, frames)}`;
 
 /** Which track is shown: a choice, where there is more than the search's own. */
 function TrackChoice() {

@@ -16,6 +16,8 @@ import { placeOf } from "./trials.js";
 const STEP = 0.02;
 const LEAST = 0.04;
 const LOOK_MILLISECONDS = 100;
+const SIDE_PIXELS = 8;
+const PANEL = ".mantine-Paper-root:has(.mantine-ScrollArea-root)";
 const KEPT = "twin-share";
 
 /** Where the divider stands, as a share of the canvas. */
@@ -25,6 +27,12 @@ const share = signal(Number(localStorage.getItem(KEPT)) || 0.5);
  * @type {import("@preact/signals").Signal<DOMRect | null>}
  */
 const canvasBox = signal(null);
+/**
+ * The box of the first scene's panel in the stage, null while it is not shown. Where the scene is
+ * narrow it lies over the canvas.
+ * @type {import("@preact/signals").Signal<DOMRect | null>}
+ */
+const panelBox = signal(null);
 /**
  * Whether a trial was shown since the page was loaded: from then on the second scene is kept ready.
  */
@@ -49,31 +57,62 @@ function moveTo(value) {
 /** @param {Document | null} page a scene's */
 const canvasOf = (page) => page?.querySelector("canvas") ?? null;
 
-/** Keep the canvas' box up to date: its panel may be folded, the page's columns may move. */
+/**
+ * Note where an element is, unless nothing changed.
+ * @param {import("@preact/signals").Signal<DOMRect | null>} place
+ * @param {Element | null | undefined} element
+ */
+function note(place, element) {
+  const [box, before] = [element?.getBoundingClientRect(), place.value];
+  const isSame =
+    box && before && ["x", "y", "width", "height"].every((key) => box[key] === before[key]);
+  if (!isSame) place.value = box?.width ? box : null;
+}
+
+/**
+ * Keep the boxes of canvas and panel up to date: the panel may be folded or lie over the canvas, the
+ * page's columns may move.
+ */
 function followCanvas() {
   const frame = /** @type {HTMLIFrameElement} */ (byId("scene"));
-  /** @type {HTMLCanvasElement | null} */
-  let known = null;
+  /** @type {WeakSet<Element>} */
+  const observed = new WeakSet();
   const measure = () => {
     const canvas = canvasOf(frame.contentDocument);
-    const box = canvas?.getBoundingClientRect();
-    const before = canvasBox.value;
-    const isSame =
-      box && before && ["x", "y", "width", "height"].every((key) => box[key] === before[key]);
-    if (!isSame) canvasBox.value = box?.width ? box : null;
-    if (canvas && canvas !== known) {
-      known = canvas;
-      observer.observe(canvas);
+    const panel = frame.contentDocument?.querySelector(PANEL);
+    note(canvasBox, canvas);
+    note(panelBox, panel);
+    for (const element of [canvas, panel]) {
+      if (!element || observed.has(element)) continue;
+      observed.add(element);
+      observer.observe(element);
     }
+    return Boolean(canvas && panel);
   };
-  const observer = new ResizeObserver(measure);
+  const observer = new ResizeObserver(() => {
+    measure();
+    // The scene puts another panel in its place where it becomes narrow or wide.
+    setTimeout(measure, LOOK_MILLISECONDS);
+  });
   observer.observe(frame);
   frame.addEventListener("load", () => {
     const wait = setInterval(() => {
-      measure();
-      if (known) clearInterval(wait);
+      if (measure()) clearInterval(wait);
     }, LOOK_MILLISECONDS);
   });
+}
+
+/**
+ * The panel in the box of the canvas: what of it lies over the canvas; null where nothing does.
+ * @param {DOMRect} canvas
+ * @param {DOMRect | null} panel
+ */
+function panelOver(canvas, panel) {
+  if (!panel) return null;
+  const [left, top] = [Math.max(0, panel.left - canvas.left), Math.max(0, panel.top - canvas.top)];
+  const right = Math.min(canvas.width, panel.right - canvas.left);
+  const bottom = Math.min(canvas.height, panel.bottom - canvas.top);
+  return right > left && bottom > top ? { left, top, right, bottom } : null;
 }
 
 /** Split the scenes, or join them again, on the server. @param {boolean} split */
@@ -166,8 +205,8 @@ function Divider() {
   </div>`;
 }
 
-/** What stands on each side of the divider. */
-function Sides() {
+/** What stands on each side of the divider. @param {{ bottom: number }} properties pixels */
+function Sides({ bottom }) {
   follow("trials");
   follow("trial");
   follow("against");
@@ -178,23 +217,34 @@ function Sides() {
       : "stored";
   const words = tried ? `tried: ${movedWords(tried.moved)}` : "tried";
   const place = `${100 * share.value}%`;
-  return html`<span class="side stored" style=${{ right: `calc(100% - ${place} + 8px)` }}>${left}</span>
-    <span class="side tried" style=${{ left: `calc(${place} + 8px)` }}>${words}</span>`;
+  const low = { bottom: `${bottom}px` };
+  const atLeft = { ...low, right: `calc(100% - ${place} + 8px)` };
+  const atRight = { ...low, left: `calc(${place} + 8px)` };
+  return html`<span class="side stored" style=${atLeft}>${left}</span>
+    <span class="side tried" style=${atRight}>${words}</span>`;
 }
 
 /** @param {{ takeKey: (event: KeyboardEvent) => void }} properties */
 function Twin({ takeKey }) {
   const box = canvasBox.value;
   if (!isNeeded.value || !box) return null;
+  // Cut out around the knobs, which are in the scene below it.
+  const panel = panelOver(box, panelBox.value);
+  const { left = 0, top = 0, right = 0, bottom = 0 } = panel ?? {};
+  const [whole, hole] = [
+    `M0 0H${box.width}V${box.height}H0Z`,
+    `M${left} ${top}H${right}V${bottom}H${left}Z`,
+  ];
   const style = {
     left: `${box.x}px`,
     top: `${box.y}px`,
     width: `${box.width}px`,
     height: `${box.height}px`,
+    clipPath: panel ? `path(evenodd, "${whole}${hole}")` : "",
   };
   return html`<div class=${`twin-box ${isSplit.value ? "" : "away"}`} style=${style}>
     <${TriedScene} takeKey=${takeKey} />
-    ${isSplit.value && html`<${Sides} /><${Divider} />`}
+    ${isSplit.value && html`<${Sides} bottom=${SIDE_PIXELS + (panel ? box.height - top : 0)} /><${Divider} />`}
   </div>`;
 }
 
