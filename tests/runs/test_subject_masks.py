@@ -78,10 +78,10 @@ def hidden_by_the_other(session: Session, people: TwoPeople, who: int) -> tuple[
     with closing(ProblemSource(Session(session.path), session.body())) as source:
         for frame in range(FRAMES):
             for view in source.evidence(frame, settings).views:
-                assert view.hidden is not None
+                assert view.unknown is not None
                 other = people.masks[1 - who][view.camera, frame] > 0
-                found += int(np.count_nonzero(view.hidden))
-                inside += int(np.count_nonzero((view.hidden > 0) & other))
+                found += int(np.count_nonzero(view.unknown))
+                inside += int(np.count_nonzero((view.unknown > 0) & other))
     return found, inside
 
 
