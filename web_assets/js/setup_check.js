@@ -215,7 +215,7 @@ function verdictOf(check) {
   const under =
     covered === null
       ? ""
-      : `, and ${percent(covered)} of the masks under the model (the rest is a limb that is elsewhere)`;
+      : `, and ${percent(covered)} of the masks under the model (the rest: a limb elsewhere, or not the subject)`;
   const [turns, jumps] = [check.turned.length, check.jumps.length];
   const parts = [
     check.good ? "The motion fits the pictures." : "Look at the frames below.",
@@ -341,6 +341,8 @@ function Better({ model }) {
   const tracks = model.tracks.value;
   const problem = model.truthProblem.value;
   const hasTruth = model.setup.detail.has_truth && !problem;
+  const measured = tracks.find((line) => line.measured_frames);
+  const part = measured && partWords(measured.measured_frames, measured.frames);
   const begin = (
     /** @type {string} */ verb,
     /** @type {string} */ made,
@@ -355,13 +357,11 @@ function Better({ model }) {
   return html`<section class="footage-step">
     <h2>Improve the track</h2>
     <${Table}
-      heads=${["track", "jitter", ...(hasTruth ? ["from truth"] : [])]}
+      heads=${["track", "jitter", ...(hasTruth ? [html`from truth<br />${part}`] : [])]}
       rows=${tracks.map((line) => [
         html`<${TrackChoice} model=${model} line=${line} />`,
         millimetres(line.jitter_mm),
-        ...(hasTruth
-          ? [`${millimetres(line.mean_mm)}${partWords(line.measured_frames, line.frames)}`]
-          : []),
+        ...(hasTruth ? [millimetres(line.mean_mm)] : []),
       ])}
     />
     ${problem && html`<p class="notice">How far the tracks are from the truth is not known. ${problem}</p>`}
