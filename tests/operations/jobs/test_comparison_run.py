@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from sample_walk import copy_of_walk
 
-from studio.foundations.errors import RunError
+from studio.foundations.errors import SettingsError
 from studio.operations.comparison_folders import new_comparison, place_of
 from studio.operations.jobs.comparison_run import done_before, run_comparison
 from studio.results.comparison.candidates import Lineup
@@ -72,7 +72,7 @@ def test_a_trial_that_fails_ends_it_with_the_reason(walk: Session) -> None:
     plan = small(walk)
     wrong = replace(plan.candidates[0], changes={**plan.candidates[0].changes, "survivor": 1})
     kept = new_comparison(place_of(walk), replace(plan, candidates=(wrong,)))
-    with pytest.raises(RunError, match=r"annealed, seed 0 could not be tracked.*survivor"):
+    with pytest.raises(SettingsError, match=r"no setting 'survivor' with tracker 'annealed'"):
         run_comparison(kept, walk, lambda *_: None, conclude, processes=1)
     assert not kept.is_running()
 
