@@ -8,6 +8,7 @@ from studio.evidence.cells import cell_at
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.numba_in_threads import EXACT, njit
 from studio.search.trackers.agreement_kernels import distance_to
+from studio.search.trackers.limb_reach import is_reached
 from studio.search.trackers.refinement_kernels import box_of, is_seen, turning
 
 SAME, CHANGED, OPEN = 0, 1, 2
@@ -135,15 +136,18 @@ def places_left_bare(
     low: Array,
     steps: NDArray[np.int64],
     spacing: float,
+    frames: Array,
+    halves: Array,
+    cubes: Bytes,
     places: Array,
 ) -> tuple[NDArray[np.int64], int]:
-    """(G,) how many places within a limb's reach no view sees unchanged and two or more see bare; and how many of
-    places (M, 3), mm, were filled in with the first of them.
+    """(G,) how many places within a limb's length, where the joints let any limb lie, no view sees unchanged and two or
+    more see bare; and how many of places (M, 3), mm, were filled in with the first of them.
 
     kinds, near : of all cells; near is above 0 beside a limb. rough : of squares of ROUGH by ROUGH cells, 0 where no
     place of a block around one seen there can have changed; begins : (V, 2) where a view's squares begin among all, and
     their columns. maps, views : as of `cell_at`. roots : (G, 3) mm, and reaches : (G,) mm, 0 for limbs that do not
-    count. low : (3,) and steps : (3,) of the grid, in blocks.
+    count. low : (3,) and steps : (3,) of the grid, in blocks. frames, halves, cubes : as of `limb_reach.Placed`.
     """
     limbs, filled = len(reaches), 0
     found, within = np.zeros(limbs, np.int64), np.zeros(limbs, np.bool_)
@@ -193,6 +197,11 @@ def places_left_bare(
                             break
                         bare += kind != OPEN and near[at] == 0
                     if not refuted and bare >= BARE_VIEWS:
+                        anywhere = False
+                        for limb in range(limbs):
+                            anywhere |= is_reached(frames, halves, cubes, limb, x, y, z)
+                        if not anywhere:
+                            continue
                         found += within
                         if filled < len(places):
                             places[filled, 0], places[filled, 1], places[filled, 2] = x, y, z

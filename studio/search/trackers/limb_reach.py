@@ -2,9 +2,10 @@
 
 Only there does what a silhouette leaves bare contradict the limb in a check. A lump of shadow, droppings or a
 reflection lies bare beside a limb in one view; whatever hides in the ray through it the others see through. A mouse
-arches its back above its haunches: no haunch gets there. A run, which draws limbs again and counts frames as well
-tracked by what it names, asks what no limb at all can reach (`reach`): by this reach a rearing mouse was searched worse
-(16 and 17 instead of 10 mm in the second labelled frame).
+arches its back above its haunches: no haunch gets there. A run, which draws limbs again where it names them, asks what
+no limb at all can reach (of silhouettes `reach`, of what changed in the pictures the cubes of all limbs here,
+`limb_places`): by each limb's own reach a rearing mouse was searched worse (16 and 17 instead of 10 mm in the second
+labelled frame).
 
 Poses are drawn within the limits. For each limb the cubes that it lies in are kept, in the frame of what it hangs from.
 """

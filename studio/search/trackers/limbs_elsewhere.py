@@ -3,8 +3,9 @@
 The silhouettes cannot witness against a limb that they lack, as where the shadow test has taken bare arms for the
 floor's shadow. What differs from the background at all, shadows too, still has them. A grid of points is projected into
 all views: a point within a limb's reach that lies on changed cells in every view that sees it, and in two views or more
-far from all limbs of the pose, is something that the pose does not explain. A shadow on the floor is none: only points
-well above the floor count. Of the limbs in whose reach such points lie those are elsewhere whose own
+far from all limbs of the pose, is something that the pose does not explain. Where no limb's joints let it lie
+(`limb_reach`) none is looked for: behind a hand the forearm goes on that the body has not. A shadow on the floor is
+none: only points well above the floor count. Of the limbs in whose reach such points lie those are elsewhere whose own
 projection explains little: a limb that is where it seems covers changed cells that no other limb covers, and a lost one
 lies outside them, or on other limbs.
 
@@ -43,6 +44,7 @@ from studio.search.trackers.limb_places import (
     places_left_bare,
     squares_of,
 )
+from studio.search.trackers.limb_reach import limb_reach_of
 from studio.search.trackers.tracker import HIDDEN
 
 SPACING = 35.0
@@ -138,7 +140,8 @@ class LimbsElsewhere:
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
         self._body, self._cameras, self._agreement = body, cameras, Agreement(body, cameras)
         self._scale, names = scale_of(body), limb_names(body)
-        self._limbs = tuple(dict.fromkeys(names))
+        self._reach = limb_reach_of(body, names)
+        self._limbs = self._reach.limbs
         self._owners = np.array([self._limbs.index(name) for name in names])
         self._bending = tuple(limb for limb in self._limbs if names.count(limb) > 1)
         self._roots = np.array([names.index(limb) for limb in self._limbs])
@@ -236,6 +239,7 @@ class LimbsElsewhere:
             low,
             steps,
             spacing,
+            *self._reach.placed(pose),
             places,
         )
         return bare, own, places[:filled]

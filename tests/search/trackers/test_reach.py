@@ -15,10 +15,12 @@ from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.model import BodyModel
 from studio.body.reader import assemble, check_definition
 from studio.evidence.distance_maps import SilhouetteDistances, distances_of
+from studio.evidence.frame_evidence import ViewEvidence
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 from studio.search.trackers.agreement import Agreement, limb_names
 from studio.search.trackers.limb_reach import LimbReach, is_reached
+from studio.search.trackers.limbs_elsewhere import LimbsElsewhere, change_of
 from studio.search.trackers.reach import Reach
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
 
@@ -129,7 +131,7 @@ def test_of_a_body_that_cannot_bend_nothing_is_beyond() -> None:
     assert not beyond.any()
 
 
-def seen_with_forearm(pose: Array, length: float) -> list[SilhouetteDistances]:
+def masks_with_forearm(pose: Array, length: float) -> list[Array]:
     """Masks of a hand's cones, and of a forearm of some length behind its wrist, which the body has not."""
     frame = joint_frames(HAND, pose)[0, [joint.name for joint in HAND.joints].index("palm")]
     masks = []
@@ -138,8 +140,12 @@ def seen_with_forearm(pose: Array, length: float) -> list[SilhouetteDistances]:
         corners = np.array([[x, y, z] for x in (-25, 25) for y in (-16, 16) for z in (-34.0 - length, -20.0)])
         pixels = project(camera, corners @ frame[:, :3].T + frame[:, 3])[0]
         cv2.fillConvexPoly(mask, cv2.convexHull(np.round(pixels).astype(np.int32)), 255)
-        masks.append(distances_of(mask, 150))
+        masks.append(mask)
     return masks
+
+
+def seen_with_forearm(pose: Array, length: float) -> list[SilhouetteDistances]:
+    return [distances_of(mask, 150) for mask in masks_with_forearm(pose, length)]
 
 
 def hand(**angles: float) -> Array:
@@ -157,6 +163,25 @@ def test_a_forearm_behind_the_wrist_is_no_lost_limb(fist: float) -> None:
     pose = hand(**bent)
     shares = Agreement(HAND, NEAR).of(pose, seen_with_forearm(pose, 60.0)).shares()
     assert max(shares.values()) < 0.5 * LIMB_LOST_SHARE
+
+
+@pytest.mark.parametrize("fist", [0.0, 70.0])
+def test_a_forearm_that_changed_in_all_pictures_is_no_thumb_that_is_elsewhere(fist: float) -> None:
+    """It lies within the thumb's length of the thumb's root, but no joint lets it get there."""
+    bent = {f"{finger}_mcp": fist for finger in ("index", "middle", "ring", "little")}
+    witness = LimbsElsewhere(HAND, NEAR)
+
+    def unexplained(truth: Array, pose: Array) -> dict[str, float]:
+        changed = [
+            change_of(ViewEvidence(camera.name, mask, mask, mask))
+            for camera, mask in zip(NEAR, masks_with_forearm(truth, 60.0), strict=True)
+        ]
+        return {limb: one.unexplained for limb, one in witness.of(pose, changed).items()}
+
+    # Above what may be a shadow on the floor: 0 to 60 mm here.
+    high = hand(**bent, wrist_z=150.0)
+    assert max(unexplained(high, high).values()) < 0.1
+    assert unexplained(hand(**bent), hand(**{**bent, "index_mcp": 80.0, "index_pip": 90.0}))["index"] > 0.3
 
 
 def test_beside_a_forearm_a_finger_that_is_elsewhere_is_found() -> None:
