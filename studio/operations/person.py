@@ -65,12 +65,12 @@ def subject(
     Raises BodyError for an unknown body or length, or a size that is impossible.
     """
     opened = open_session(session)
-    wanted = Subject(
-        body=body or opened.manifest.body, height_mm=height_mm, lengths_mm=dict(lengths_mm or {})
-    )
-    if wanted == Subject(body=wanted.body) and not body:
+    if height_mm is None and not lengths_mm and not body:
         tree, notes = opened.body_with_notes()
     else:
+        wanted = Subject(
+            body=body or opened.manifest.body, height_mm=height_mm, lengths_mm=dict(lengths_mm or {})
+        )
         lost = lengths_left_out(opened, wanted)
         tree, notes = choose_subject(opened, wanted).body_with_notes()
         notes = (*notes, *lost)

@@ -34,8 +34,9 @@ LEVEL_IT = (
     "Level it: studio level SESSION turns the world to the vertical and finds the floor (by the silhouettes, by the"
     " feet of a run, or --clicks of floor points); or calibrate with the board on the floor (studio calibrate --floor)."
 )
-AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-_SIX_AXES = tuple(sign * np.array(axis) for axis in AXES.values() for sign in (1.0, -1.0))
+AXES = {
+    sign + axis: np.array(WORLDS[sign + axis][2], dtype=np.float64) for axis in "xyz" for sign in ("", "-")
+}
 STEREO_MM = 15.0
 """Cameras side by side lie at least so far from their middle."""
 CENTRED = (0.2, 0.8)
@@ -117,7 +118,7 @@ def _sound(cameras: Sequence[Camera]) -> bool:
     return (
         common_target(tuple(cameras)) is not None
         and not looks_at_one_place(cameras)
-        and upright_about(cameras, np.array(AXES["Z"]))
+        and upright_about(cameras, AXES["z"])
         and all(camera.centre[2] > 0.0 for camera in cameras)
     )
 
@@ -147,10 +148,10 @@ def _transposed(cameras: Sequence[Camera]) -> Iterator[Finding]:
 
 def _up_axis(cameras: Sequence[Camera], up: str) -> Iterator[Finding]:
     vertical = common_vertical(cameras)
-    if upright_about(cameras, np.array(AXES["Z"])):
+    if upright_about(cameras, AXES["z"]):
         yield from _tilt(vertical)
         return
-    for direction in _SIX_AXES:
+    for direction in AXES.values():
         if upright_about(cameras, direction):
             off = vertical.off(direction) if vertical is not None else 0.0
             axis = _axis_of_file(direction, up)
@@ -158,7 +159,7 @@ def _up_axis(cameras: Sequence[Camera], up: str) -> Iterator[Finding]:
             message += f"; the cameras' common vertical is {off:.1f} degrees off it." if off > 1.0 else "."
             yield Finding("up-axis", "blocks", message, _import_with(axis))
             return
-    if vertical is not None and vertical.level and vertical.off(np.array(AXES["Z"])) <= LYING_DEGREES:
+    if vertical is not None and vertical.level and vertical.off(AXES["z"]) <= LYING_DEGREES:
         yield from _tilt(vertical)
     elif vertical is not None and not _upright_in_turned_pictures(cameras):
         yield from _lying(cameras, vertical, up)
@@ -166,7 +167,7 @@ def _up_axis(cameras: Sequence[Camera], up: str) -> Iterator[Finding]:
 
 def _tilt(vertical: Vertical | None) -> Iterator[Finding]:
     """Z is nearly the vertical, and evidently not quite."""
-    off = vertical.off(np.array(AXES["Z"])) if vertical is not None else 0.0
+    off = vertical.off(AXES["z"]) if vertical is not None else 0.0
     if vertical is None or not vertical.level or off <= max(TILTED_DEGREES, 3.0 * vertical.degrees):
         return
     message = (
@@ -178,10 +179,10 @@ def _tilt(vertical: Vertical | None) -> Iterator[Finding]:
 
 def _lying(cameras: Sequence[Camera], vertical: Vertical, up: str) -> Iterator[Finding]:
     """Z is not upright, and no axis is in all pictures."""
-    off = vertical.off(np.array(AXES["Z"]))
+    off = vertical.off(AXES["z"])
     if off <= ASKEW_DEGREES:
         return
-    direction = min(_SIX_AXES, key=vertical.off)
+    direction = min(AXES.values(), key=vertical.off)
     axis, nearest = _axis_of_file(direction, up), vertical.off(direction)
     message = (
         f"The world's {_spoken(up)} axis does not point up in the pictures: it is {off:.0f} degrees off their"
@@ -200,12 +201,11 @@ def _lying(cameras: Sequence[Camera], vertical: Vertical, up: str) -> Iterator[F
 
 
 def _axis_of_file(direction: Array, up: str) -> str:
-    """The axis of the file's world ("x", "-z", …) that an axis of the cameras' world is, (3,) with one entry of 1 or
-    -1, where the file's `up` was taken for their z.
+    """The axis of the file's world ("x", "-z", …) that one of AXES is in the cameras', where the file's `up` was taken
+    for their z.
     """
-    in_file = np.array(WORLDS[up], dtype=np.float64).T @ direction
-    number = int(np.argmax(np.abs(in_file)))
-    return ("-" if in_file[number] < 0.0 else "") + "xyz"[number]
+    in_file = direction @ np.array(WORLDS[up])
+    return next(axis for axis, own in AXES.items() if (own == in_file).all())
 
 
 def _spoken(axis: str) -> str:

@@ -150,12 +150,9 @@ def background_step(session: Session) -> StepStatus:
         words = "background from the footage"
     if known is None:
         is_set = given or plates == len(sources) or bool(read_evidence(session).knobs)
-        why = "" if given else NOT_LOOKED_AT
-        return (
-            StepStatus("background", "done", words, why)
-            if is_set
-            else StepStatus("background", "ready", words)
-        )
+        if not is_set:
+            return StepStatus("background", "ready", words)
+        return StepStatus("background", "done", words, "" if given else NOT_LOOKED_AT)
     words = known.words or words
     stale = _stale(session, "background", words, "Measured with")
     if stale is not None:

@@ -8,7 +8,7 @@ from studio.evidence.cells import cell_at
 from studio.foundations.arrays import Array, Bytes
 from studio.foundations.numba_in_threads import EXACT, njit
 from studio.search.trackers.agreement_kernels import distance_to
-from studio.search.trackers.limb_reach import is_reached
+from studio.search.trackers.limb_reach import is_reached_by_any
 from studio.search.trackers.refinement_kernels import box_of, is_seen, turning
 
 SAME, CHANGED, OPEN = 0, 1, 2
@@ -196,12 +196,9 @@ def places_left_bare(
                             refuted = True
                             break
                         bare += kind != OPEN and near[at] == 0
-                    if not refuted and bare >= BARE_VIEWS:
-                        anywhere = False
-                        for limb in range(limbs):
-                            anywhere |= is_reached(frames, halves, cubes, limb, x, y, z)
-                        if not anywhere:
-                            continue
+                    if refuted or bare < BARE_VIEWS:
+                        continue
+                    if is_reached_by_any(frames, halves, cubes, x, y, z):
                         found += within
                         if filled < len(places):
                             places[filled, 0], places[filled, 1], places[filled, 2] = x, y, z

@@ -162,6 +162,17 @@ def is_reached(frames: Array, halves: Array, cubes: Bytes, limb: int, x: float, 
 
 
 @njit(**EXACT)
+def is_reached_by_any(frames: Array, halves: Array, cubes: Bytes, x: float, y: float, z: float) -> bool:
+    """Whether any limb may lie at a place, mm; anywhere, where no limb has cubes. Others : as of `Placed`."""
+    some = False
+    for limb in range(len(halves)):
+        if is_reached(frames, halves, cubes, limb, x, y, z):
+            return True
+        some |= halves[limb] > 0.0
+    return not some
+
+
+@njit(**EXACT)
 def is_agreed(
     signed: Floats,
     corners: NDArray[np.int64],

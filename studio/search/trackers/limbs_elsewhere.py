@@ -140,8 +140,7 @@ class LimbsElsewhere:
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
         self._body, self._cameras, self._agreement = body, cameras, Agreement(body, cameras)
         self._scale, names = scale_of(body), limb_names(body)
-        self._reach = limb_reach_of(body, names)
-        self._limbs = self._reach.limbs
+        self._names, self._limbs = names, tuple(dict.fromkeys(names))
         self._owners = np.array([self._limbs.index(name) for name in names])
         self._bending = tuple(limb for limb in self._limbs if names.count(limb) > 1)
         self._roots = np.array([names.index(limb) for limb in self._limbs])
@@ -239,7 +238,7 @@ class LimbsElsewhere:
             low,
             steps,
             spacing,
-            *self._reach.placed(pose),
+            *limb_reach_of(self._body, self._names).placed(pose),
             places,
         )
         return bare, own, places[:filled]

@@ -19,7 +19,7 @@ from studio.evidence.frame_evidence import ViewEvidence
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 from studio.search.trackers.agreement import Agreement, limb_names
-from studio.search.trackers.limb_reach import LimbReach, is_reached
+from studio.search.trackers.limb_reach import LimbReach, is_reached, is_reached_by_any
 from studio.search.trackers.limbs_elsewhere import LimbsElsewhere, change_of
 from studio.search.trackers.reach import Reach
 from studio.search.trackers.tracker import LIMB_LOST_SHARE
@@ -182,6 +182,14 @@ def test_a_forearm_that_changed_in_all_pictures_is_no_thumb_that_is_elsewhere(fi
     high = hand(**bent, wrist_z=150.0)
     assert max(unexplained(high, high).values()) < 0.1
     assert unexplained(hand(**bent), hand(**{**bent, "index_mcp": 80.0, "index_pip": 90.0}))["index"] > 0.3
+
+
+def test_arms_that_all_hang_from_the_world_may_lie_anywhere() -> None:
+    arms = load_body("branched_arms6")
+    placed = LimbReach(arms, limb_names(arms)).placed(arms.neutral)
+    assert not placed.halves.any()
+    assert is_reached_by_any(*placed, 1e4, 0.0, 0.0)
+    assert not is_reached_by_any(*LimbReach(HAND, limb_names(HAND)).placed(hand()), 1e4, 0.0, 0.0)
 
 
 def test_beside_a_forearm_a_finger_that_is_elsewhere_is_found() -> None:
