@@ -12,11 +12,11 @@ from studio.foundations.errors import FootageError, NotFoundError
 from studio.foundations.words import sentence
 from studio.operations.masks import (
     background,
-    exclude_region,
     give_plates,
     mask_knobs,
     mask_quality,
     mask_settings,
+    paint_region,
 )
 from studio.runs.setup.background_setup import SOURCES
 from studio.runs.setup.mask_quality import MaskQuality
@@ -42,6 +42,13 @@ OWN = (
         help="What does not count: painted, a polygon, none (CAMERA=), or all that no view's hull comes near.",
     ),
     click.option(
+        "--in-front",
+        multiple=True,
+        metavar="CAMERA=MASK.png|CAMERA=X,Y;X,Y;X,Y",
+        help="Where a thing stands in front of the subject's place, so that it cannot be told what is there: painted, a"
+        " polygon, none (CAMERA=).",
+    ),
+    click.option(
         "--quality", is_flag=True, help="Measure how far the masks agree in the hull, camera by camera."
     ),
     click.option(
@@ -57,12 +64,13 @@ OWN = (
 )
 
 
-@command_of(background, *OWN, without=("source", "plates", "exclude", "exclude_unused"))
+@command_of(background, *OWN, without=("source", "plates", "exclude", "exclude_unused", "in_front"))
 def background_command(
     call: Call,
     source: str | None,
     plates: Sequence[str],
     exclude: Sequence[str],
+    in_front: Sequence[str],
     quality: bool,
     frames: str,
     pictures: Path | None,
@@ -72,7 +80,9 @@ def background_command(
         session = _with_plates(session, plates)
     for word in exclude:
         if word != UNUSED:
-            exclude_region(session, *_region(word))
+            paint_region(session, "exclusions", *_region("--exclude", word))
+    for word in in_front:
+        paint_region(session, "in_front", *_region("--in-front", word))
     if source is None and (call.given.get("strokes") or call.given.get("run")):
         raise FootageError("Strokes are a source of masks.", "Give --source strokes too.")
     if source is None and call.given.get("subject_at"):
@@ -82,7 +92,8 @@ def background_command(
     if source is not None:
         call(session=session, source=source, exclude_unused=UNUSED in exclude)
         session = Session(session.path)
-    if quality or pictures or (session.is_comparable if source is not None else not plates and not exclude):
+    changed = plates or exclude or in_front
+    if quality or pictures or (session.is_comparable if source is not None else not changed):
         return _answer(session, call.do(mask_quality, frames=frame_numbers(frames), pictures=pictures))
     return _answer(session, None)
 
@@ -157,11 +168,14 @@ def _with_plates(session: Session, words: Sequence[str]) -> Session:
     return give_plates(session, {camera: Path(path) for camera, _, path in parted})
 
 
-def _region(word: str) -> tuple[str, Path | list[tuple[float, ...]] | None]:
-    """A camera, and what does not count of it: a painted picture, a polygon, or nothing any more."""
+def _region(option: str, word: str) -> tuple[str, Path | list[tuple[float, ...]] | None]:
+    """A camera, and a region of it: a painted picture, a polygon, or none any more."""
     camera, equals, value = word.partition("=")
     if not equals:
-        raise NotFoundError(f"'--exclude {word}' cannot be understood.", "Write CAMERA=MASK.png, or unused.")
+        unused = ", or unused" if option == "--exclude" else ""
+        raise NotFoundError(
+            f"'{option} {word}' cannot be understood.", f"Write CAMERA=MASK.png or CAMERA=X,Y;X,Y;X,Y{unused}."
+        )
     if not value or Path(value).is_file():
         return camera, Path(value) if value else None
     try:

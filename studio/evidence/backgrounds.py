@@ -21,7 +21,7 @@ from studio.evidence.background import (
 )
 from studio.evidence.combined_background import combine
 from studio.evidence.yuv_background import YuvBackground, independent_background, learn_background
-from studio.footage.capture.footage import Footage
+from studio.footage.capture.footage import REGIONS, Footage, Region
 from studio.footage.capture.pictures import is_picture, read_picture
 from studio.footage.capture.video import VideoReader, measure_video
 from studio.foundations.arrays import Bytes, evenly_spread
@@ -44,7 +44,7 @@ class Backgrounds:
         self._footage = footage
         self._fitted: dict[tuple[str, FittedKind], BackgroundModel] = {}
         self._yuv: dict[tuple[str, float], YuvBackground] = {}
-        self._exclusions: dict[str, Bytes | None] = {}
+        self._regions: dict[tuple[str, Region], Bytes | None] = {}
         self._locks = {camera: threading.Lock() for camera in footage.cameras}
 
     def model(self, camera: str, kind: FittedKind) -> BackgroundModel:
@@ -77,14 +77,15 @@ class Backgrounds:
             for key in list(self._yuv):
                 if key[0] == camera:
                     del self._yuv[key]
-            self._exclusions.pop(camera, None)
+            for kind in REGIONS:
+                self._regions.pop((camera, kind), None)
 
-    def exclusion(self, camera: str) -> Bytes | None:
-        """(H, W) uint8, 255 in excluded areas; None without any. Raises FootageError."""
+    def region(self, kind: Region, camera: str) -> Bytes | None:
+        """(H, W) uint8, 255 in it; None without any. Raises FootageError."""
         with self._locks[camera]:
-            if camera not in self._exclusions:
-                self._exclusions[camera] = self._footage.exclusion(camera)
-            return self._exclusions[camera]
+            if (camera, kind) not in self._regions:
+                self._regions[camera, kind] = self._footage.region(kind, camera)
+            return self._regions[camera, kind]
 
     def combined(self, camera: str) -> tuple[GaussianBackground, NDArray[np.bool_]]:
         """Plate (or clip) and footage combined, and a mask (H, W) of doubtful pixels: all without a plate."""

@@ -30,7 +30,7 @@ from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence, ViewEviden
 from studio.evidence.masks import PackedMask, cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.evidence.threshold import between_thresholds
-from studio.footage.capture.footage import Footage
+from studio.footage.capture.footage import REGIONS, Footage
 from studio.foundations.arrays import Bytes, Floats
 from studio.foundations.errors import FootageError
 from studio.foundations.geometry.camera import Camera
@@ -157,12 +157,14 @@ class EvidenceMaker:
         with span("mask", frame):
             mask, unknown = self.finished(camera, raw)
         given = self._hidden(camera, frame)
-        view = self.of_mask(camera, frame, mask, unknown if given is None else given)
+        if given is not None:
+            unknown = with_things_in_front(mask, given, self.in_front(camera))
+        view = self.of_mask(camera, frame, mask, unknown)
         if self._with_empty:
             view = replace(view, empty=self._backgrounds.empty(camera))
         if raw.shadow is None:
             return view
-        return replace(view, shadow=_not_excluded(raw.shadow, self._backgrounds.exclusion(camera)))
+        return replace(view, shadow=_not_excluded(raw.shadow, self._backgrounds.region("exclusions", camera)))
 
     def views(
         self, cameras: Sequence[str], frames: Sequence[int], progress: Callable[[int, int], None]
@@ -235,7 +237,7 @@ class EvidenceMaker:
         return self.settings.background_model in ("auto", "gaussian") and all(
             self.footage.background_path(camera) is not None
             and not self.footage.has_masks(camera)
-            and self._backgrounds.exclusion(camera) is None
+            and all(self._backgrounds.region(kind, camera) is None for kind in REGIONS)
             for camera in self.cameras
         )
 
@@ -262,8 +264,13 @@ class EvidenceMaker:
         return RawMask(found.mask, True, shadow, found.brightness)
 
     def finished(self, camera: str, raw: RawMask) -> tuple[Bytes, Bytes | None]:
-        """A camera's raw mask and what is unknown of it, as by `finished`."""
-        return finished(raw, self.settings, self._backgrounds.exclusion(camera))
+        """A camera's raw mask and what is unknown of it, as by `finished`, things in front of the subject too."""
+        mask, unknown = finished(raw, self.settings, self._backgrounds.region("exclusions", camera))
+        return mask, with_things_in_front(mask, unknown, self.in_front(camera))
+
+    def in_front(self, camera: str) -> Bytes | None:
+        """(H, W) 255 where a thing stands in front of the subject's place; None without any."""
+        return self._backgrounds.region("in_front", camera)
 
     def _edges(self, picture: Bytes, mask: Bytes) -> Bytes:
         """The edge map that the weighting uses."""
@@ -313,6 +320,14 @@ def finished(
     mask = whole & tidy(raw.mask, replace(settings, mask_min_component=0, mask_keep_components=0))
     unknown = whole - mask
     return mask, unknown if unknown.any() else None
+
+
+def with_things_in_front(mask: Bytes, unknown: Bytes | None, in_front: Bytes | None) -> Bytes | None:
+    """(H, W) what is unknown, with what a thing in front may hide of the subject; None where nothing is."""
+    if in_front is None:
+        return unknown
+    behind = in_front & ~mask
+    return behind if unknown is None else unknown | behind
 
 
 def _not_excluded(mask: Bytes, excluded: Bytes | None) -> Bytes:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from studio.evidence.settings import EvidenceSettings
-from studio.footage.capture.footage import EXCLUSIONS
+from studio.footage.capture.footage import Region
 from studio.footage.capture.naming import match_names
 from studio.footage.capture.pictures import is_picture, painted_picture, png_of
 from studio.foundations.declaring import Knobs, Terminal, Values, Web, operation, taking
@@ -34,13 +34,13 @@ from studio.runs.setup.session_settings import session_settings
 from studio.runs.setup.stroke_masks import unpainted_cameras
 from studio.search.settings import values
 from studio.sessions.background_files import (
+    add_polygon,
     change_evidence,
     given_masks_of,
     home_of_masks,
-    polygon_exclusion,
     read_evidence,
     set_backgrounds,
-    set_exclusion,
+    set_region,
 )
 from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
@@ -62,6 +62,15 @@ class MaskRequest:
         Field(
             description="By camera, the region that does not count: a polygon (K, 2) of pixels or the path of a"
             " painted picture; None removes it."
+        ),
+        Terminal(left_out=True),
+        Web(left_out=True),
+    ] = None
+    in_front: Annotated[
+        Mapping[str, ArrayLike | str | Path | None] | None,
+        Field(
+            description="By camera, where a thing stands in front of the subject's place (a table, a pole), so that"
+            " it cannot be told what is there: a polygon or a painted picture, as for `exclude`."
         ),
         Terminal(left_out=True),
         Web(left_out=True),
@@ -88,6 +97,13 @@ class MaskRequest:
         Field(description="Regions that no view's hull comes near do not count."),
         Terminal(left_out=True),
     ] = False
+    find_in_front: Annotated[
+        bool,
+        Field(
+            description="Look for things that stand in front of the subject's place, by the masks of three cameras or"
+            " more; what was painted stays."
+        ),
+    ] = True
     subject_at: Annotated[
         tuple[float, float] | None,
         Field(
@@ -131,7 +147,9 @@ def background(
     if request.plates:
         opened = give_plates(opened, {camera: Path(path) for camera, path in request.plates.items()})
     for camera, region in (request.exclude or {}).items():
-        exclude_region(opened, camera, region)
+        paint_region(opened, "exclusions", camera, region)
+    for camera, region in (request.in_front or {}).items():
+        paint_region(opened, "in_front", camera, region)
     strokes = None if request.strokes is None else strokes_of_file(opened, Path(request.strokes))
     with reporting(progress, f"{opened.name}: background") as report:
         try:
@@ -144,6 +162,7 @@ def background(
                 strokes=strokes,
                 run=request.run,
                 subject_at=request.subject_at,
+                find_in_front=request.find_in_front,
                 progress=report,
             )
         finally:
@@ -221,40 +240,42 @@ def keep_mask_knobs(session: Session, knobs: Mapping[str, Value]) -> MaskKnobs:
 
 
 @dataclass(frozen=True, slots=True)
-class Exclusion:
-    """The region of a camera that does not count. pixels : how many."""
+class PaintedRegion:
+    """A region of a camera. pixels : how many."""
 
     camera: str
     pixels: int
 
 
-def exclude_region(session: Session, camera: str, region: ArrayLike | str | Path | bytes | None) -> Exclusion:
-    """Let a region of a camera's pictures not count.
+def paint_region(
+    session: Session, kind: Region, camera: str, region: ArrayLike | str | Path | bytes | None
+) -> PaintedRegion:
+    """Let a region of a camera's pictures not count, or say that a thing stands in front of the subject's place there.
 
     region : as `background` takes it, or the bytes of a painted picture; none removes it.
 
     Raises NotFoundError, FootageError.
     """
     if region is None or isinstance(region, bytes):
-        pixels = set_exclusion(session, camera, region or b"")
+        pixels = set_region(session, kind, camera, region or b"")
     elif isinstance(region, str | Path):
-        pixels = set_exclusion(session, camera, png_of(painted_picture(read_file(Path(region)))))
+        pixels = set_region(session, kind, camera, png_of(painted_picture(read_file(Path(region)))))
     else:
-        pixels = polygon_exclusion(session, camera, np.asarray(region, dtype=np.float64))
+        pixels = add_polygon(session, kind, camera, np.asarray(region, dtype=np.float64))
     forget_composers()
-    return Exclusion(camera, pixels)
+    return PaintedRegion(camera, pixels)
 
 
-def excluded_picture(session: Session, camera: str) -> bytes:
-    """PNG, as stored: white where a camera's pictures do not count. Raises NotFoundError where all of them count."""
-    path = _exclusion_of(session, session.camera_source(camera).name)
+def region_picture(session: Session, kind: Region, camera: str) -> bytes:
+    """PNG, as stored: white in a region of a camera. Raises NotFoundError where nothing is painted."""
+    path = _region_of(session, kind, session.camera_source(camera).name)
     if not path.exists():
-        raise NotFoundError(f"Nothing of camera '{camera[:64]}' is excluded.", "Paint something.")
+        raise NotFoundError(f"Nothing is painted on camera '{camera[:64]}'.", "Paint something.")
     return read_file(path)
 
 
-def _exclusion_of(session: Session, camera: str) -> Path:
-    return session.path / EXCLUSIONS / f"{camera}.png"
+def _region_of(session: Session, kind: Region, camera: str) -> Path:
+    return session.path / kind / f"{camera}.png"
 
 
 def give_plates(session: Session, plates: Mapping[str, Path], files: Iterable[Path] = ()) -> Session:
@@ -284,6 +305,8 @@ class BackgroundCamera:
     file : its name.
     masks : whether it has some.
     excluded : whether regions of it do not count.
+    in_front : whether things in front of the subject's place are known.
+    found : whether these were found in the masks, not painted.
     width, height : pixels.
     """
 
@@ -292,6 +315,8 @@ class BackgroundCamera:
     file: str
     masks: bool
     excluded: bool
+    in_front: bool
+    found: bool
     width: int
     height: int
 
@@ -346,7 +371,9 @@ def background_of(session: Session) -> Background:
             "" if not given else "plate" if is_picture(Path(given)) else "clip",
             given.rpartition("/")[2],
             bool(source.masks),
-            _exclusion_of(session, source.name).exists(),
+            _region_of(session, "exclusions", source.name).exists(),
+            _region_of(session, "in_front", source.name).exists(),
+            source.name in evidence.found_in_front,
             source.width,
             source.height,
         )

@@ -2,6 +2,7 @@
 
 background/…                 plates and clips; the manifest names the one in use
 exclusions/<camera>.png      white where nothing counts: a bystander, a monitor
+in_front/<camera>.png        white where a thing stands in front of the subject's place: a table, a pole
 person_masks/<n>/<camera>/…  masks that the studio made of a person, a PNG a frame, as those that come with footage; the
                              manifest names those in use
 animal_masks/<n>/<camera>/…  those of an animal before known backgrounds
@@ -24,7 +25,7 @@ import msgspec
 import numpy as np
 
 from studio.evidence.backgrounds import check_plate_size
-from studio.footage.capture.footage import EXCLUSIONS, background_turn, turned_picture
+from studio.footage.capture.footage import Region, background_turn, turned_picture
 from studio.footage.capture.footage_source import CameraSource
 from studio.footage.capture.pictures import check_picture, is_picture, painted_picture, png_of, with_polygon
 from studio.footage.capture.video import measure_video
@@ -46,7 +47,7 @@ ANIMAL_MASKS, PERSON_MASKS, STROKE_MASKS, CHOSEN_MASKS, SUBJECT_MASKS = HOMES = 
     "subject_masks",
 )
 WHOLE = "whole"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 MASKS_GONE = (
     "The masks that the studio made were of the footage as it was before, and are gone: make them again with 'studio"
     " background SESSION --source person' (or animal, strokes, or best)."
@@ -57,13 +58,15 @@ Knob = bool | int | float | str
 
 class SessionEvidence(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """knobs : by flat name. given : camera to the given background, where a cleaned one is in use. given_masks : camera
-    to the masks that came with its footage, "" for none, where the studio's own are in use.
+    to the masks that came with its footage, "" for none, where the studio's own are in use. found_in_front : cameras
+    whose things in front were found in the masks: painted by hand they are kept when masks are set up again.
     """
 
     schema: int = SCHEMA_VERSION
     knobs: dict[str, Knob] = {}
     given: dict[str, str] = {}
     given_masks: dict[str, str] = {}
+    found_in_front: list[str] = []
 
 
 _RECORD = RecordFile(
@@ -72,8 +75,8 @@ _RECORD = RecordFile(
     "Remove it, and set the background again.",
     ("Session '{name}' has no background.", "Set it again."),
     SCHEMA_VERSION,
-    # Version 1 knew no masks of the studio's own.
-    {1: lambda entries: entries},
+    # Version 1 knew no masks of the studio's own, version 2 no things in front.
+    {1: lambda entries: entries, 2: lambda entries: entries},
 )
 
 
@@ -112,7 +115,7 @@ def write_evidence(session: Session, evidence: SessionEvidence) -> None:
     _RECORD.write(session.path / EVIDENCE_NAME, evidence)
 
 
-def change_evidence(session: Session, **entries: Mapping[str, Knob] | Mapping[str, str]) -> None:
+def change_evidence(session: Session, **entries: Mapping[str, Knob] | Mapping[str, str] | list[str]) -> None:
     """Change entries of what is stored of a session's masks, in a turn: what others change meanwhile is kept."""
     with one_at_a_time(session.path):
         write_evidence(session, msgspec.structs.replace(read_evidence(session), **entries))
@@ -312,37 +315,58 @@ def use_masks(session: Session, names: Mapping[str, str]) -> Session:
     return redescribe(session, msgspec.structs.replace(session.manifest, footage=changed))
 
 
-def set_exclusion(session: Session, camera: str, content: bytes) -> int:
-    """Store a painted picture (PNG or other) of excluded regions; an empty one removes them. Returns the pixels.
+def set_region(session: Session, kind: Region, camera: str, content: bytes) -> int:
+    """Store a region of a camera, a painted picture (PNG or other); an empty one removes it. Returns its pixels.
 
     Raises FootageError for an unreadable picture, or one of another size than the footage.
     """
     source = session.camera_source(camera)
-    path = session.path / EXCLUSIONS / f"{camera}.png"
-    if not content:
-        path.unlink(missing_ok=True)
-        return 0
-    painted = painted_picture(content)
+    painted = painted_picture(content) if content else np.zeros((source.height, source.width), np.uint8)
     if painted.shape != (source.height, source.width):
         raise FootageError(
-            f"The exclusion is {painted.shape[1]}x{painted.shape[0]} pixels, camera {camera}"
+            f"What was painted is {painted.shape[1]}x{painted.shape[0]} pixels, camera {camera}"
             f" {source.width}x{source.height}.",
             "Give a PNG of the footage's size.",
         )
-    count = int(np.count_nonzero(painted))
-    if not count:
+    _write_region(session, kind, camera, painted)
+    if kind == "in_front":
+        found = read_evidence(session).found_in_front
+        if camera in found:
+            change_evidence(session, found_in_front=[name for name in found if name != camera])
+    return int(np.count_nonzero(painted))
+
+
+def _write_region(session: Session, kind: Region, camera: str, painted: Bytes) -> None:
+    path = session.path / kind / f"{camera}.png"
+    if not painted.any():
         path.unlink(missing_ok=True)
-        return 0
+        return
     path.parent.mkdir(exist_ok=True)
     atomic_files.write_bytes(path, png_of(painted))
-    return count
 
 
-def polygon_exclusion(session: Session, camera: str, corners: Array) -> int:
-    """Add a polygon (K, 2) of pixels to the excluded regions. Returns the pixels of all. Raises NotFoundError."""
+def painted_in_front(session: Session) -> list[str]:
+    """Cameras whose things in front were painted by hand."""
+    found = read_evidence(session).found_in_front
+    return [path.stem for path in sorted((session.path / "in_front").glob("*.png")) if path.stem not in found]
+
+
+def use_found_in_front(session: Session, found: Mapping[str, Bytes]) -> None:
+    """Replace the things that were found in front before. found : by camera, not those painted by hand."""
+    with one_at_a_time(session.path):
+        for camera in read_evidence(session).found_in_front:
+            if camera not in found:
+                (session.path / "in_front" / f"{camera}.png").unlink(missing_ok=True)
+        for camera, painted in found.items():
+            _write_region(session, "in_front", camera, painted)
+        change_evidence(session, found_in_front=sorted(found))
+
+
+def add_polygon(session: Session, kind: Region, camera: str, corners: Array) -> int:
+    """Add a polygon (K, 2) of pixels to a region of a camera. Returns the pixels of all. Raises NotFoundError."""
     source = session.camera_source(camera)
-    path = session.path / EXCLUSIONS / f"{camera}.png"
+    path = session.path / kind / f"{camera}.png"
     painted = np.zeros((source.height, source.width), np.uint8)
     if path.exists():
         painted = painted_picture(read_file(path))
-    return set_exclusion(session, camera, png_of(with_polygon(painted, corners)))
+    return set_region(session, kind, camera, png_of(with_polygon(painted, corners)))

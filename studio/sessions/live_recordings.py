@@ -20,6 +20,7 @@ import msgspec
 import numpy as np
 
 from studio.footage.capture.calibration_files import write_calibration
+from studio.footage.capture.footage import REGIONS
 from studio.footage.capture.footage_source import CameraSource, FootageSource
 from studio.footage.capture.live_cameras import PictureSet, SpreadFigures, spread_figures
 from studio.footage.capture.pictures import picture_path
@@ -47,7 +48,7 @@ COLUMNS = ("frame", "moment", "spread_ms", "lagging", "left_out", "arrivals")
 END = "end"
 BEING_RECORDED, RECORDED = "live take, being recorded", "live take"
 FROM_PLATES = ("auto", "gaussian")
-COPIED = (SUBJECT_NAME, SIGMA_NAME, EVIDENCE_NAME, BODIES_NAME, "exclusions", "calibration")
+COPIED = (SUBJECT_NAME, SIGMA_NAME, EVIDENCE_NAME, BODIES_NAME, *REGIONS, "calibration")
 
 
 @dataclass(frozen=True, slots=True)

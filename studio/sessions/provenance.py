@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from studio.footage.capture.footage import EXCLUSIONS
+from studio.footage.capture.footage import REGIONS
 from studio.foundations.errors import SessionError
 from studio.foundations.foreign_files import read_file
 from studio.sessions.background_files import EVIDENCE_NAME
@@ -132,7 +132,7 @@ def _masks_digest(session: Session) -> str:
     sources = session.manifest.footage.cameras
     parts = [msgspec.json.encode([[source.name, source.masks, source.background] for source in sources])]
     files = [session.path / source.background for source in sources if source.background]
-    files += sorted((session.path / EXCLUSIONS).glob("*.png"))
+    files += [path for kind in REGIONS for path in sorted((session.path / kind).glob("*.png"))]
     parts += [_file_digest(path).encode() for path in files]
     return _digest(*parts, _content(session.path / EVIDENCE_NAME))
 

@@ -35,7 +35,7 @@ OF_ANOTHER = {
 OWN_WORDS = {
     "track": {"first", "last"},
     "batch": {"first", "last"},
-    "background": {"source", "plates", "exclude", "exclude_unused"},
+    "background": {"source", "plates", "exclude", "exclude_unused", "in_front"},
     "compare": {"trackers", "first", "last", "changes"},
     "sweep": {"vary", "first", "last"},
     "view": {"layer"},

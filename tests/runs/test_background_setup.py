@@ -20,10 +20,10 @@ from studio.runs.setup.background_setup import set_up_background
 from studio.runs.setup.clean_plates import median_of_empty
 from studio.runs.setup.session_settings import session_settings
 from studio.sessions.background_files import (
-    polygon_exclusion,
+    add_polygon,
     read_evidence,
     set_backgrounds,
-    set_exclusion,
+    set_region,
     use_given_backgrounds,
     write_evidence,
 )
@@ -100,7 +100,7 @@ def test_plates_are_taken_over_and_wrong_ones_refused(session: Session, tmp_path
 
 def test_what_is_excluded_is_in_no_mask(session: Session, tmp_path: Path) -> None:
     changed = set_backgrounds(session, plates(tmp_path, change=False))
-    count = polygon_exclusion(changed, "cam0", np.array([[0, 0], [159, 0], [159, 119], [0, 119]]))
+    count = add_polygon(changed, "exclusions", "cam0", np.array([[0, 0], [159, 0], [159, 119], [0, 119]]))
     assert count == 160 * 120
     footage = changed.footage()
     maker = EvidenceMaker(
@@ -111,8 +111,10 @@ def test_what_is_excluded_is_in_no_mask(session: Session, tmp_path: Path) -> Non
     assert not views[0].mask.any()
     assert views[1].mask.any()
     with pytest.raises(FootageError, match="160x119"):
-        set_exclusion(changed, "cam0", cv2.imencode(".png", np.zeros((119, 160), np.uint8))[1].tobytes())
-    assert set_exclusion(changed, "cam0", b"") == 0
+        set_region(
+            changed, "exclusions", "cam0", cv2.imencode(".png", np.zeros((119, 160), np.uint8))[1].tobytes()
+        )
+    assert set_region(changed, "exclusions", "cam0", b"") == 0
 
 
 @pytest.mark.slow
@@ -155,7 +157,7 @@ def test_how_masks_are_made_is_read_from_older_files(session: Session) -> None:
         {},
     )
     write_evidence(session, found)
-    assert json.loads(path.read_text())["schema"] == 2
+    assert json.loads(path.read_text())["schema"] == 3
 
 
 def test_sources_that_are_not_there_are_refused(session: Session) -> None:

@@ -5,7 +5,7 @@ import { fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { AlignmentBox, alignmentOf } from "./setup_alignment.js";
-import { Brush, loadExcluded } from "./setup_brush.js";
+import { Brush, loadRegion } from "./setup_brush.js";
 import { MaskPictures, shownMasks } from "./setup_masks.js";
 import { QualityList, SourceTable } from "./setup_quality.js";
 import { Strokes } from "./setup_strokes.js";
@@ -80,9 +80,10 @@ export function modelOf(setup, loaded) {
   const strokes = signal(loaded.strokes);
   /** The chosen source. @type {import("@preact/signals").Signal<Background["source"]>} */
   const source = signal(isSet ? loaded.background.source : recommended(loaded, isPerson));
-  /** Whether the knobs are tuned, and whether what the subject never comes near is excluded. */
+  /** Whether the knobs are tuned, what the subject never comes near is excluded, and things in front of it found. */
   const isTuned = signal(true);
   const isUnusedExcluded = signal(false);
+  const isFindingInFront = signal(true);
   /** Knobs that are tried. @type {import("@preact/signals").Signal<Record<string, any>>} */
   const changed = signal({});
   const quality = signal(loaded.background.job?.quality ?? null);
@@ -179,6 +180,7 @@ export function modelOf(setup, loaded) {
         knobs: changed.value,
         tune: isTuned.value,
         exclude_unused: isUnusedExcluded.value && source.value === "combined",
+        find_in_front: isFindingInFront.value,
         subject_at: source.value === "subject" ? (subject.value?.at ?? null) : null,
       });
       if (!newest) take(begun);
@@ -223,10 +225,15 @@ export function modelOf(setup, loaded) {
     shown.refresh();
   }
 
-  /** Paint what does not count of a camera, over its picture. @param {string} camera */
-  async function exclude(camera) {
+  /**
+   * Paint a region of a camera, over its picture: what does not count, or what hides the subject.
+   * @param {import("./setup_brush.js").Region} kind
+   * @param {string} camera
+   */
+  async function paintRegion(kind, camera) {
     const known = background.value.cameras.find((one) => one.name === camera);
-    const before = known?.excluded ? await loadExcluded(setup.session, camera) : null;
+    const isPainted = kind === "exclusions" ? known?.excluded : known?.in_front;
+    const before = isPainted ? await loadRegion(setup.session, kind, camera) : null;
     const done = async (/** @type {boolean} */ isSaved) => {
       if (isSaved) {
         quality.value = null;
@@ -236,7 +243,7 @@ export function modelOf(setup, loaded) {
       leave();
     };
     const frame = shown.frame.value;
-    painted.value = { Editor: Brush, setup, lens: lensOf(camera), frame, before, done };
+    painted.value = { Editor: Brush, setup, kind, lens: lensOf(camera), frame, before, done };
   }
 
   /** Paint strokes on a camera's picture. @param {string} camera */
@@ -266,6 +273,7 @@ export function modelOf(setup, loaded) {
     source,
     isTuned,
     isUnusedExcluded,
+    isFindingInFront,
     changed,
     quality,
     seen,
@@ -281,7 +289,8 @@ export function modelOf(setup, loaded) {
     setUp,
     give,
     keep,
-    exclude: (/** @type {string} */ camera) => exclude(camera).catch(complain),
+    exclude: (/** @type {string} */ camera) => paintRegion("exclusions", camera).catch(complain),
+    hide: (/** @type {string} */ camera) => paintRegion("in_front", camera).catch(complain),
     paint: (/** @type {string} */ camera) => paint(camera).catch(complain),
     cancel: () => remove(`${here}/background`).catch(complain),
     stop: () => {
@@ -487,7 +496,7 @@ function Plates({ model }) {
 
 /** The sources, what the chosen one needs, and what sets it up. @param {{ model: Model }} properties */
 function Make({ model }) {
-  const { job, possible, sources, source: used } = model.background.value;
+  const { cameras, job, possible, sources, source: used } = model.background.value;
   const source = model.source.value;
   const isUnderWay = model.isUnderWay();
   const isReady = possible.includes(source) && (source !== "subject" || model.subject.value);
@@ -520,6 +529,16 @@ function Make({ model }) {
         title="A bystander, a monitor, a window: motion there is not the subject."
       >
         exclude regions that the subject never comes near
+      </${Check}>`
+    }
+    ${
+      cameras.length >= 3 &&
+      html`<${Check}
+        checked=${model.isFindingInFront.value}
+        take=${into(model.isFindingInFront)}
+        title="A table, a pole: what it hides of the subject is unknown, not empty. What you painted stays."
+      >
+        look for things that stand in front of the subject
       </${Check}>`
     }
     ${
@@ -670,6 +689,7 @@ export function Beside({ model }) {
     cameras=${model.background.value.cameras}
     quality=${model.quality.value}
     exclude=${model.exclude}
+    hide=${model.hide}
     paint=${model.paint}
     otherwise=${inUseWords(model)}
   />`;

@@ -1,5 +1,5 @@
-// A brush over a camera's picture: what is painted does not count. Mouse, pen or keyboard; kept as
-// a PNG of the footage's own size and orientation.
+// A brush over a camera's picture: what is painted does not count, or hides the subject. Mouse, pen
+// or keyboard; kept as a PNG of the footage's own size and orientation.
 
 import { fault, putBytes, sessionPath } from "./api.js";
 import { element, penOf } from "./elements.js";
@@ -9,23 +9,36 @@ import { html, signal, useLayoutEffect, useRef, useState } from "./studio/compon
 import { Action, Toggle } from "./studio/parts.js";
 
 const UNDONE = 30;
-const HELP =
-  "Paint what is not the subject. Keys: arrows move, space paints, x paints or erases, " +
+const KEYS =
+  "Keys: arrows move, space paints, x paints or erases, " +
   "[ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
+/** What can be painted, in words. */
+const REGIONS = {
+  exclusions: { title: "Excluded regions", help: "Paint what is not the subject." },
+  in_front: {
+    title: "Things in front",
+    help: "Paint what stands between the camera and the subject: a table, a pole.",
+  },
+};
+/** @typedef {keyof typeof REGIONS} Region */
 
-const placeOf = (/** @type {string} */ session, /** @type {string} */ camera) =>
-  `${sessionPath(session)}/exclusions/${encodeURIComponent(camera)}`;
+const placeOf = (
+  /** @type {string} */ session,
+  /** @type {Region} */ kind,
+  /** @type {string} */ camera,
+) => `${sessionPath(session)}/${kind}/${encodeURIComponent(camera)}`;
 
 /**
- * What is excluded of a camera already, as a picture: read before a stroke can be made, since one
+ * What is painted of a camera already, as a picture: read before a stroke can be made, since one
  * that came after would undo what was painted meanwhile.
  * @param {string} session
+ * @param {Region} kind
  * @param {string} camera
  */
-export async function loadExcluded(session, camera) {
-  const answer = await fetch(placeOf(session, camera));
+export async function loadRegion(session, kind, camera) {
+  const answer = await fetch(placeOf(session, kind, camera));
   if (!answer.ok)
-    throw fault(`The excluded regions of ${camera} could not be read.`, "Open the brush again.");
+    throw fault(`What is painted on ${camera} could not be read.`, "Open the brush again.");
   return createImageBitmap(await answer.blob());
 }
 
@@ -46,14 +59,14 @@ function turned(source, by, [width, height]) {
 }
 
 /**
- * @typedef {{ setup: import("./setup.js").Setup, frame: number,
+ * @typedef {{ setup: import("./setup.js").Setup, frame: number, kind: Region,
  *   lens: import("./setup_painting.js").Lens, before: ImageBitmap | null,
  *   done: (isSaved: boolean) => any }} Properties
- *   `before`: what is excluded already; `done`: called when it is left
+ *   `before`: what is painted already; `done`: called when it is left
  */
 
 /** What is painted, and what can be done. @param {Properties} properties */
-function brushOf({ setup, lens, before, done }) {
+function brushOf({ setup, kind, lens, before, done }) {
   const colour = getComputedStyle(document.documentElement).getPropertyValue("--accent").trim();
   const isErasing = signal(false);
   /** What undo brings back. */
@@ -99,7 +112,7 @@ function brushOf({ setup, lens, before, done }) {
       ? await new Promise((resolve) => out.toBlob(resolve, "image/png"))
       : "";
     try {
-      await putBytes(placeOf(setup.session, lens.name), content);
+      await putBytes(placeOf(setup.session, kind, lens.name), content);
       await done(true);
     } catch (error) {
       complain(error);
@@ -151,16 +164,17 @@ function brushOf({ setup, lens, before, done }) {
   };
 }
 
-/** Edit what is excluded of a camera. @param {Properties} properties */
+/** Edit a region of a camera. @param {Properties} properties */
 export function Brush(properties) {
-  const { lens, frame, done } = properties;
+  const { lens, kind, frame, done } = properties;
+  const { title, help } = REGIONS[kind];
   const [model] = useState(() => brushOf(properties));
   const canvas = useRef(/** @type {any} */ (null));
   useLayoutEffect(() => model.start(canvas.current), []);
   const isErasing = model.isErasing.value;
   return html`
     <div class="mask-bar">
-      <b>${lens.name}</b>
+      <b>${lens.name}</b><span class="hint">${title.toLowerCase()}</span>
       <${Size} painting=${model.painting} />
       <${Toggle} isOn=${isErasing} act=${model.exchange}>Erase</${Toggle}>
       <${Action} kind="small" act=${model.takeBack} disabled=${!model.undone.value.length}>
@@ -174,10 +188,10 @@ export function Brush(properties) {
     <${Sheet}
       painting=${model.painting}
       address=${model.painting.picture(frame, "show=mask&")}
-      label=${`Excluded regions of ${lens.name}. ${HELP}`}
+      label=${`${title} of ${lens.name}. ${help} ${KEYS}`}
       canvas=${canvas}
       ring=${{ class: isErasing ? "erasing" : "" }}
     />
-    <p class="hint brush-help">${HELP}</p>
+    <p class="hint brush-help">${help} ${KEYS}</p>
   `;
 }

@@ -76,10 +76,11 @@ export function shownMasks(setup, count) {
 /** @typedef {Schemas["BackgroundAnswer"]["cameras"][number]} Camera */
 /**
  * @typedef {{ shown: Shown, cameras: Camera[], quality: Schemas["MaskQuality"] | null,
- *   exclude: (camera: string) => void, paint: (camera: string) => void, otherwise?: string }}
+ *   exclude: (camera: string) => void, hide: (camera: string) => void,
+ *   paint: (camera: string) => void, otherwise?: string }}
  *   MaskProperties
- *   `exclude` opens the brush for what does not count, `paint` that for strokes; `otherwise`: in
- *   words whose masks are shown, where others were chosen
+ *   `exclude` opens the brush for what does not count, `hide` that for things in front, `paint`
+ *   that for strokes; `otherwise`: in words whose masks are shown, where others were chosen
  */
 
 /** The pictures, and the bar that chooses their frame. @param {MaskProperties} properties */
@@ -135,7 +136,7 @@ export function MaskPictures({ shown, cameras, otherwise = "", ...more }) {
  * One request at a time; the newest one follows when the last is answered.
  * @param {Omit<MaskProperties, "cameras"> & { camera: Camera }} properties
  */
-function MaskPicture({ shown, camera, quality, exclude, paint }) {
+function MaskPicture({ shown, camera, quality, exclude, hide, paint }) {
   const image = useRef(/** @type {HTMLImageElement | null} */ (null));
   const [state, setState] = useState("waiting");
   const wanted = shown.address(camera.name);
@@ -175,6 +176,10 @@ function MaskPicture({ shown, camera, quality, exclude, paint }) {
           </span>`
         }
         ${camera.excluded && html`<span class="hint">regions excluded</span>`}
+        ${
+          camera.in_front &&
+          html`<span class="hint">things in front ${camera.found ? "found" : "painted"}</span>`
+        }
         <span class="spring"></span>
         <${Action}
           kind="small"
@@ -189,6 +194,13 @@ function MaskPicture({ shown, camera, quality, exclude, paint }) {
           aria-label=${`Exclude regions of ${camera.name}`}
         >
           Exclude…
+        </${Action}>
+        <${Action}
+          kind="small"
+          act=${() => hide(camera.name)}
+          aria-label=${`Paint things in front in ${camera.name}`}
+        >
+          In front…
         </${Action}>
       </div>
     </figcaption>

@@ -23,16 +23,16 @@ from studio.foundations.records import extended
 from studio.operations.jobs.job_runner import Job, JobKind, SessionJob
 from studio.operations.masks import (
     Background,
-    Exclusion,
     MaskKnobs,
+    PaintedRegion,
     background_of,
-    exclude_region,
-    excluded_picture,
     give_plates,
     keep_mask_knobs,
     mask_knobs,
     mask_quality,
     mask_settings,
+    paint_region,
+    region_picture,
 )
 from studio.operations.masks import background as set_background
 from studio.operations.subjects import SubjectsInView, subjects_in_view
@@ -100,14 +100,27 @@ async def measure(session: OpenSession) -> MaskQuality:
 @router.get("/exclusions/{camera}", response_class=Response)
 def exclusion(session: OpenSession, camera: str) -> Response:
     """The painted picture of what does not count: white on black, as stored."""
-    return files.picture(excluded_picture(session, camera), "png")
+    return files.picture(region_picture(session, "exclusions", camera), "png")
 
 
 @router.put("/exclusions/{camera}")
-async def put_exclusion(session: OpenSession, camera: str, request: HttpRequest) -> Exclusion:
+async def put_exclusion(session: OpenSession, camera: str, request: HttpRequest) -> PaintedRegion:
     """Exclude what is painted in a PNG of the footage's size; an empty body or picture excludes nothing."""
     content = await request.body()
-    return await asyncio.to_thread(exclude_region, session, camera, content)
+    return await asyncio.to_thread(paint_region, session, "exclusions", camera, content)
+
+
+@router.get("/in_front/{camera}", response_class=Response)
+def in_front(session: OpenSession, camera: str) -> Response:
+    """The picture of what stands in front of the subject's place: white on black, as stored."""
+    return files.picture(region_picture(session, "in_front", camera), "png")
+
+
+@router.put("/in_front/{camera}")
+async def put_in_front(session: OpenSession, camera: str, request: HttpRequest) -> PaintedRegion:
+    """Say where things stand in front of the subject's place: a PNG of the footage's size; an empty body: none do."""
+    content = await request.body()
+    return await asyncio.to_thread(paint_region, session, "in_front", camera, content)
 
 
 @router.get("/evidence")

@@ -18,7 +18,7 @@ from collections import Counter, OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 
@@ -29,8 +29,10 @@ from studio.foundations.arrays import Bytes
 from studio.foundations.errors import FootageError, NotFoundError
 from studio.foundations.memory import give_back_freed_memory
 
-EXCLUSIONS = "exclusions"
-"""Folder of a session with a painted picture a camera."""
+Region = Literal["exclusions", "in_front"]
+"""Regions of a camera's pictures that stay the same in all frames: where nothing counts, and where a thing stands in
+front of the subject's place. Each is a folder of a session with a painted picture a camera."""
+REGIONS: tuple[Region, ...] = get_args(Region)
 HIDDEN = "hidden"
 """Beside cameras' folders of masks, a folder with the same names: pictures, white where the masks say nothing of the
 subject, for another one is in front of it."""
@@ -139,21 +141,21 @@ class Footage:
         }
         return frozenset(missing) if len(missing) < len(self.cameras) else frozenset()
 
-    def exclusion(self, camera: str) -> Bytes | None:
-        """(H, W) uint8, 255 where nothing that a camera sees counts, None where all does: `exclusions/<camera>.png`.
+    def region(self, kind: Region, camera: str) -> Bytes | None:
+        """(H, W) uint8, 255 in a region of a camera's pictures, None where nothing is painted: `<kind>/<camera>.png`.
 
         Raises FootageError for a picture of another size.
         """
-        path = self.folder / EXCLUSIONS / f"{camera}.png"
+        path = self.folder / kind / f"{camera}.png"
         if not path.exists():
             return None
         picture = read_picture(path)
         source = self._by_name[camera]
         if picture.shape[:2] != (source.height, source.width):
             raise FootageError(
-                f"The exclusion of camera {camera} is {picture.shape[1]}x{picture.shape[0]} pixels, the footage"
+                f"The picture '{kind}/{path.name}' is {picture.shape[1]}x{picture.shape[0]} pixels, the footage"
                 f" {source.width}x{source.height}.",
-                f"Paint it again, or remove '{EXCLUSIONS}/{path.name}'.",
+                "Paint it again, or remove it.",
             )
         return thresholded_mask(picture)
 

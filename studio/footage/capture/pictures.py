@@ -216,7 +216,7 @@ def painted_picture(content: bytes) -> Bytes:
         picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if picture is None:
         raise FootageError(
-            "The exclusion is no picture that can be read.", "Give a PNG of the footage's size."
+            "What was painted is no picture that can be read.", "Give a PNG of the footage's size."
         )
     if picture.ndim == 3 and picture.shape[2] == 4:
         alpha = picture[..., 3]

@@ -21,6 +21,7 @@ from functools import partial
 from typing import Literal, get_args
 
 import msgspec
+import numpy as np
 
 from studio.body.scale import scale_of
 from studio.evidence.backgrounds import FEWEST_FRAMES, Backgrounds
@@ -49,6 +50,7 @@ from studio.runs.setup.projected_masks import projected_masks
 from studio.runs.setup.session_settings import masks_of, session_settings
 from studio.runs.setup.stroke_masks import check_all_cameras, make_stroke_masks
 from studio.runs.setup.subject_masks import Place, make_subject_masks
+from studio.runs.setup.things_in_front import find_things_in_front
 from studio.search.settings import changed_settings
 from studio.sessions.background_files import (
     ANIMAL_MASKS,
@@ -63,9 +65,11 @@ from studio.sessions.background_files import (
     forget_unused_masks,
     given_masks_of,
     made_masks,
+    painted_in_front,
     read_evidence,
-    set_exclusion,
+    set_region,
     use_cleaned,
+    use_found_in_front,
     use_given_backgrounds,
     use_given_masks,
     write_evidence,
@@ -240,6 +244,7 @@ def set_up_background(
     strokes: Sequence[Stroke] | None = None,
     run: str = "",
     subject_at: Place | None = None,
+    find_in_front: bool = True,
     progress: Progress = no_progress,
 ) -> BackgroundSetup:
     """Set a session's background and store it. knobs : of the masks, fixed. tune : try values for the others.
@@ -249,7 +254,9 @@ def set_up_background(
     be; the others who are in view are cut out of them.
 
     exclude_unused : also exclude regions that no hull comes near in any frame (only where backgrounds are cleaned;
-    existing exclusions stay). On failure or cancellation the session's backgrounds, masks and knobs are unchanged.
+    existing exclusions stay). find_in_front : look in the new masks for things that stand in front of the subject's
+    place, with three calibrated cameras or more; what was painted stays. On failure or cancellation the session's
+    backgrounds, masks and knobs are unchanged.
     Raises FootageError for a missing source, SettingsError for an invalid knob, SessionError while a run is being
     tracked whose masks would be made anew.
     """
@@ -277,6 +284,8 @@ def set_up_background(
                 )
         if subject_at is not None:
             made = _cut_to_subject(Session(session.path), subject_at, made, progress)
+        if find_in_front and session.is_comparable:
+            made = _with_things_in_front(Session(session.path), made, progress)
     except BaseException:
         if strokes is not None:
             restore_strokes(session, had_strokes)
@@ -343,7 +352,7 @@ def _set_up(
                 f"{name}: {100.0 * plate.never_empty:.0f} % of the picture are empty in no frame of the footage."
             )
             if wanted.exclude_unused and not (session.path / "exclusions" / f"{name}.png").exists():
-                set_exclusion(session, name, png_of(plate.never_taken))
+                set_region(session, "exclusions", name, png_of(plate.never_taken))
     own: dict[str, Knob] = {"background_model": model, **chosen}
     quality = None
     if tune and not MASK_SOURCES[source].has_knobs:
@@ -407,6 +416,22 @@ def _cut_to_subject(
     change_evidence(session, knobs=own)
     notes = (*made.notes, *([f"The subject is not seen in {frames_in_words(lost)}."] if lost else []))
     return BackgroundSetup("subject", own, notes, _agreement(session, own, progress), made.choice)
+
+
+def _with_things_in_front(session: Session, made: BackgroundSetup, progress: Progress) -> BackgroundSetup:
+    """The session with the things that its masks show in front of the subject's place, and notes on them."""
+    found = find_things_in_front(session, painted_in_front(session), progress)
+    use_found_in_front(session, found)
+    notes = [
+        f"{name}: something stands in front of the subject's place ({_share_in_words(thing)} of the picture). What it"
+        " hides counts as unknown."
+        for name, thing in found.items()
+    ]
+    return dataclasses.replace(made, notes=(*made.notes, *notes))
+
+
+def _share_in_words(thing: Bytes) -> str:
+    return f"{100.0 * np.count_nonzero(thing) / thing.size:.1f} %"
 
 
 def candidates(session: Session) -> list[BackgroundSource]:

@@ -10,7 +10,7 @@ Agreement says nothing of what all masks lack. So the contrast of subject and ba
 """
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -223,12 +223,13 @@ def mask_quality(
             borders[camera.name].append(border_support(view.picture, view.mask))
             if blame:
                 people[frame].put(camera.name, person_alone(view.mask))
+        in_front = _small_in_front(maker, lenses)
         counted: list[FrameCounts] = []
         seen: list[int] = []
         for done, frame in enumerate(chosen):
             progress("comparing masks", len(cameras) * len(masks) + done, total)
             seen += [count_subjects(masks[frame], small, scale)] if blame else []
-            counted.append(count_frame(masks[frame], small, blame, scale=scale))
+            counted.append(count_frame(masks[frame], small, blame, scale=scale, in_front=in_front))
     quality = summed(chosen, tuple(camera.name for camera in cameras), counted)
     faults = silhouette_faults(cameras, people, height_of(session), scale) if blame else ()
     subjects = sorted(seen, reverse=True)[:2][-1] if seen else 0
@@ -237,6 +238,12 @@ def mask_quality(
         dataclasses.replace(view, border=float(np.mean(borders[view.camera]))) for view in quality.views
     )
     return dataclasses.replace(quality, views=views, doubts=faults, subjects=subjects, contrast=contrast)
+
+
+def _small_in_front(maker: EvidenceMaker, lenses: Mapping[str, Camera]) -> dict[str, Bytes]:
+    """Things in front, of the cameras that have one, as small as the compared masks."""
+    things = {name: maker.in_front(name) for name in lenses}
+    return {name: reduced(one, lenses[name]) for name, one in things.items() if one is not None}
 
 
 def _each_view(
@@ -310,7 +317,8 @@ def _measured_quickly(session: Session, progress: Progress) -> MaskQuality:
         for camera, frame, view in _each_view(maker, cameras, frames, total, progress):
             masks[frame].append(reduced(view.mask, lenses[camera.name]))
             people[frame].put(camera.name, person_alone(view.mask))
-    counted = [count_frame(masks[frame], small, False, ROUGH, scale) for frame in frames]
+        in_front = _small_in_front(maker, lenses)
+    counted = [count_frame(masks[frame], small, False, ROUGH, scale, in_front) for frame in frames]
     faults = silhouette_faults(cameras, people, height_of(session), scale)
     return dataclasses.replace(
         summed(frames, tuple(camera.name for camera in cameras), counted), doubts=faults
@@ -335,34 +343,44 @@ def count_frame(
     blame: bool = True,
     fineness: HullSettings = FINE,
     scale: float = 1.0,
+    in_front: Mapping[str, Bytes] | None = None,
 ) -> FrameCounts:
     """The pixels that `ViewQuality`'s shares are made of.
 
     masks : (H, W) 0 or 255, in the order of the cameras. fineness : of the hull that the masks are compared with.
-    scale : of the body (`scale_of`).
+    scale : of the body (`scale_of`). in_front : (H, W) of cameras, above 0 where a thing in front may hide the subject:
+    there a mask that lacks it removes nothing, and does not disagree.
     """
-    box = person_box(masks, cameras, scale)
-    whole = None if box is None else large_hull(Reconstructor(cameras, box, fineness), masks)
+    nothing = np.zeros((1, 1), np.uint8)
+    hidden: list[Bytes] = [(in_front or {}).get(camera.name, nothing) for camera in cameras]
+    opened: list[Bytes] = [one | thing for one, thing in zip(masks, hidden, strict=True)]
+    box = person_box(opened, cameras, scale)
+    whole = None if box is None else large_hull(Reconstructor(cameras, box, fineness), opened)
+    covers: list[Bytes] = [
+        covered(whole, camera) & (one | ~thing)
+        for camera, one, thing in zip(cameras, masks, hidden, strict=True)
+    ]
     mask = np.array([np.count_nonzero(one) for one in masks])
-    covers = [covered(whole, camera) for camera in cameras]
     both = np.array([np.count_nonzero(one & cover) for one, cover in zip(masks, covers, strict=True)])
     removed = np.zeros(len(cameras), dtype=np.int64)
     if blame and len(cameras) > 2 and box is not None:
-        removed = removed_pixels(masks, cameras, Reconstructor(cameras, box, ROUGH))
+        removed = removed_pixels(masks, opened, cameras, Reconstructor(cameras, box, ROUGH))
     hull = np.array([np.count_nonzero(cover) for cover in covers])
     pixels = np.array([one.size for one in masks])
     return FrameCounts(mask, hull, both, removed, 0.0 if whole is None else whole.volume() * 1e-6, pixels)
 
 
 def removed_pixels(
-    masks: Sequence[Bytes], cameras: tuple[Camera, ...], carver: Reconstructor
+    masks: Sequence[Bytes], opened: Sequence[Bytes], cameras: tuple[Camera, ...], carver: Reconstructor
 ) -> NDArray[np.int64]:
-    """(V,) pixels of the other cameras' masks that the hull covers only when a camera is left out."""
-    whole = large_hull(carver, masks)
+    """(V,) pixels of the other cameras' masks that the hull covers only when a camera is left out. opened : the masks
+    that carve, with what things in front may hide.
+    """
+    whole = large_hull(carver, opened)
     open_yet = [mask & ~covered(whole, camera) for mask, camera in zip(masks, cameras, strict=True)]
     removed = np.zeros(len(cameras), dtype=np.int64)
     for left_out in range(len(cameras)):
-        alone = large_hull(carver, without(masks, left_out))
+        alone = large_hull(carver, without(opened, left_out))
         for other, camera in enumerate(cameras):
             if other != left_out:
                 removed[left_out] += np.count_nonzero(open_yet[other] & covered(alone, camera))
