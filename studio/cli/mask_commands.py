@@ -174,7 +174,8 @@ def _region(option: str, word: str) -> tuple[str, Path | list[tuple[float, ...]]
     if not equals:
         unused = ", or unused" if option == "--exclude" else ""
         raise NotFoundError(
-            f"'{option} {word}' cannot be understood.", f"Write CAMERA=MASK.png or CAMERA=X,Y;X,Y;X,Y{unused}."
+            f"'{option} {word}' cannot be understood.",
+            f"Write CAMERA=MASK.png or CAMERA=X,Y;X,Y;X,Y{unused}.",
         )
     if not value or Path(value).is_file():
         return camera, Path(value) if value else None

@@ -77,6 +77,37 @@ def test_the_background_is_set_up_and_the_views_agree(
     page.locator("#theme").click()
 
 
+def test_a_thing_in_front_is_painted_and_seen_in_the_masks(
+    page: Page, studio: StudioServer, artefacts: Path
+) -> None:
+    step(page, studio, "background")
+    camera = studio.get("/api/sessions/person/background")["cameras"][0]
+    expect(page.get_by_label("look for things that stand in front of the subject")).to_be_checked()
+    button = page.get_by_role("button", name=f"Paint things in front in {camera['name']}", exact=True)
+    button.click()
+    canvas = page.locator(".brush-canvas")
+    box = canvas.bounding_box()
+    page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 0.2 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 0.7 * box["height"], steps=4)
+    page.mouse.up()
+    shoot(page, artefacts / "setup-in-front-brush.png")
+    page.get_by_role("button", name="Keep", exact=True).first.click()
+    expect(page.get_by_text("in front: painted")).to_be_visible()
+    all_masks_are_there(page)
+    shoot(page, artefacts / "setup-in-front.png")
+    kept = studio.workspace / "person" / "in_front" / f"{camera['name']}.png"
+    painted = cv2.imread(str(kept), cv2.IMREAD_GRAYSCALE)
+    assert painted[round(0.5 * camera["height"]), round(0.7 * camera["width"])] == 255
+    button.click()
+    page.locator(".brush-canvas").wait_for()
+    page.get_by_role("button", name="Clear all").click()
+    page.get_by_role("button", name="Keep", exact=True).first.click()
+    page.locator(".masks .picture").first.wait_for()
+    expect(page.get_by_text("in front: painted")).to_be_hidden()
+    assert not kept.exists()
+
+
 def test_a_region_is_painted_by_mouse_and_keyboard(page: Page, studio: StudioServer, artefacts: Path) -> None:
     step(page, studio, "background")
     camera = studio.get("/api/sessions/person/background")["cameras"][0]

@@ -178,7 +178,7 @@ function MaskPicture({ shown, camera, quality, exclude, hide, paint }) {
         ${camera.excluded && html`<span class="hint">regions excluded</span>`}
         ${
           camera.in_front &&
-          html`<span class="hint">things in front ${camera.found ? "found" : "painted"}</span>`
+          html`<span class="hint">in front: ${camera.found ? "found" : "painted"}</span>`
         }
         <span class="spring"></span>
         <${Action}

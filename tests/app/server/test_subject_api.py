@@ -78,11 +78,12 @@ def test_a_height_gives_every_length(studio: Studio) -> None:
         write_subject(studio.workspace.session(SESSION), 164.5)
 
 
-def test_what_is_painted_does_not_count(studio: Studio) -> None:
+@pytest.mark.parametrize("kind", ["exclusions", "in_front"])
+def test_regions_of_a_camera_are_painted(studio: Studio, kind: str) -> None:
     source = studio.workspace.session(SESSION).manifest.footage.cameras[0]
     painted = np.zeros((source.height, source.width), np.uint8)
     painted[:, : source.width // 2] = 255
-    place = f"/api/sessions/{SESSION}/exclusions/{source.name}"
+    place = f"/api/sessions/{SESSION}/{kind}/{source.name}"
     studio.get(place, code=404)
     content = cv2.imencode(".png", painted)[1].tobytes()
     response = studio.put(place, content=content)

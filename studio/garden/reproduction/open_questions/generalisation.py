@@ -23,7 +23,10 @@ from studio.results.comparison.tracked import Tracked, TrackingTrial, track
 from studio.results.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.results.drawing_footage.recipes import SUBJECT_OF_HEIGHT
 from studio.runs.setup.shape_on_the_way import FIRST_FRAMES
+from studio.runs.setup.things_in_front import find_things_in_front
 from studio.search.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
+from studio.sessions.background_files import EVIDENCE_NAME, use_found_in_front
+from studio.sessions.session import Session
 
 EVALUATIONS = 1000
 NEAR_MM = 24.0
@@ -131,7 +134,14 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     plain = dict(arguments["attempt"])
     if "training" in arguments:
         plain["behaviour"] = str(model_file(cache, Training.of_plain(arguments["training"])))
+    set_up_things_in_front(cache.session(plain["footage"]))
     return asdict(track(TrackingTrial.of_plain(plain), cache))
+
+
+def set_up_things_in_front(session: Session) -> None:
+    """Find what stands in front of the subject, once for a clip: no masks of a drawn one are set up, which does it."""
+    if not (session.path / EVIDENCE_NAME).exists():
+        use_found_in_front(session, find_things_in_front(session))
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:

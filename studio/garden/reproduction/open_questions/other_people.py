@@ -22,6 +22,7 @@ from studio.garden.reproduction.open_questions.generalisation import (
     QUICK_FRAMES,
     QUICK_KINDS,
     REFINED,
+    set_up_things_in_front,
 )
 from studio.garden.reproduction.tracking import Candidate, Runs, by_group, lost_percent, named_percent
 from studio.results.comparison.findings import Plain, Table
@@ -101,6 +102,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     plain = dict(arguments["attempt"])
     if plain["footage"].startswith(PREFIX):
         plain["footage"] = str(imported(plain["footage"], cache))
+    set_up_things_in_front(cache.session(plain["footage"]))
     return asdict(track(TrackingTrial.of_plain(plain), cache))
 
 

@@ -29,7 +29,7 @@ from studio.foundations.arrays import Array, Bytes, evenly_spread
 from studio.foundations.geometry.camera import Camera
 from studio.garden.drawn_recipes import CHOOSING, KINDS, clip_name
 from studio.garden.reproduction.experiment import Part, each_seed, listed
-from studio.garden.reproduction.open_questions.generalisation import AS_A_RUN, REFINED
+from studio.garden.reproduction.open_questions.generalisation import AS_A_RUN, REFINED, set_up_things_in_front
 from studio.garden.reproduction.open_questions.other_people import ELSEWHERE, imported
 from studio.garden.reproduction.tracking import Candidate
 from studio.results.comparison.findings import Table
@@ -101,6 +101,7 @@ def measure(arguments: Mapping[str, Any], cache: FootageCache) -> dict[str, Any]
     clip, attempt = str(arguments["clip"]), dict(arguments["attempt"])
     if clip.startswith(PREFIX):
         clip = str(imported(clip, cache))
+    set_up_things_in_front(cache.session(clip))
     counts = {cause: [0] * 5 for cause in (*CAUSES, SOUND)}
     if attempt:
         tracked = track(TrackingTrial.of_plain({**attempt, "footage": clip}), cache)
