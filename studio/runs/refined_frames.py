@@ -117,10 +117,10 @@ class _Work:
         body, self._cameras = run.body(), filmed_cameras(session, run.cameras())
         self._results, self._settings = run.results(), MaskSettings(run)
         self._record, self._track, self._knobs, self._report = run.record, track, knobs, read
-        self._refiner = Refiner(body, self._cameras, knobs)
+        # Silhouettes lack limbs that were tracked along lines in the pictures: these bend as they were tracked.
         kept = followed_along_lines(body, self._settings.of(run.record.first).refinement)
-        self._as_tracked = [angle for limb in kept for angle in bent_by(body, limb)]
-        """Angles of limbs that were tracked along lines in the pictures: silhouettes lack them."""
+        self._still = [angle for limb in kept for angle in bent_by(body, limb)]
+        self._refiner = Refiner(body, self._cameras, knobs, self._still)
         self._onlooker = Onlooker(body, self._cameras)
         self._problems = ProblemSource(session, body, self._cameras)
         self._poses, self._agreement = track.poses.copy(), track.confidence.copy()
@@ -154,9 +154,7 @@ class _Work:
         self._count_read()
 
     def refine_together(self, rows: NDArray[np.int64]) -> None:
-        mover = MovementRefiner(
-            self._refiner, self._record.fps, self._knobs.refinement_acceleration, self._as_tracked
-        )
+        mover = MovementRefiner(self._refiner, self._record.fps, self._knobs.refinement_acceleration)
         seen: list[_SeenFrame] = []
         for first, after, kept in windows(len(rows)):
             while first + len(seen) < after:
@@ -200,9 +198,7 @@ class _Work:
         return without_hidden(silhouette_distances(evidence), refiner.cameras, mm, known)
 
     def _keep(self, row: int, pose: Array, sight: Callable[[Array], Sight]) -> None:
-        tracked, pose = self._track.poses[row], pose.copy()
-        pose[self._as_tracked] = tracked[self._as_tracked]
-        self._before.append(sight(tracked).overlap)
+        self._before.append(sight(self._track.poses[row]).overlap)
         self._poses[row], self._agreement[row] = pose, sight(pose).overlap
         self._after.append(float(self._agreement[row]))
 
@@ -215,4 +211,4 @@ class _Work:
         if len(views) == len(self._cameras):
             return self._refiner
         cameras = tuple(camera for camera in self._cameras if camera.name in views)
-        return Refiner(self._refiner.body, cameras, self._knobs)
+        return Refiner(self._refiner.body, cameras, self._knobs, self._still)

@@ -51,7 +51,7 @@ PASSED = 0.25
 while a place was a gap in it."""
 WIDEST_GAP = 0.25
 """Of that root: half the breadth of a gap."""
-LEAST_SHARE = 0.03
+LEAST_SHARE = 0.015
 """Of a silhouette's area (median): smaller finds are noise."""
 GROWN = 0.15
 """Of the root of a silhouette's area: how far a find grows into what never shows silhouette. The subject comes behind

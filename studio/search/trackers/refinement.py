@@ -156,8 +156,16 @@ class Refined:
 class Refiner:
     """Refines poses of one body in some cameras; immutable."""
 
-    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: RefinementSettings) -> None:
+    def __init__(
+        self,
+        body: BodyModel,
+        cameras: tuple[Camera, ...],
+        settings: RefinementSettings,
+        still: Sequence[int] = (),
+    ) -> None:
+        """still : numbers of parameters that stay as they are."""
         self.body, self.cameras, self.settings = body, cameras, settings
+        self.still = np.isin(np.arange(len(body.neutral)), still)
         self.projector = OutlineProjector.of_body(body, cameras)
         length = MM_PER_RADIAN * scale_of(body)
         self.unit = np.where(body.angles, 1.0, length)
@@ -266,6 +274,7 @@ class Refiner:
     def _stepped(self, pose: Array, gradient: Array, matrix: Array, damping: float) -> Array:
         """One damped step inside the limits; parameters that press against a limit stay there."""
         held = ((pose <= self.lower) & (gradient > 0.0)) | ((pose >= self.upper) & (gradient < 0.0))
+        held |= self.still
         free = np.flatnonzero(~held)
         part = matrix[free[:, None], free]
         part.flat[:: len(free) + 1] += (
@@ -273,7 +282,8 @@ class Refiner:
         )
         step = np.zeros(len(pose))
         step[free] = -np.linalg.solve(part, gradient[free])
-        return np.clip(pose + step * self.unit, self.lower, self.upper)
+        moved = np.clip(pose + step * self.unit, self.lower, self.upper)
+        return np.where(self.still, pose, moved)
 
     def _prepared(self, pose: Array, silhouettes: Sequence[Distances], pixels: float = 0.0) -> "_Prepared":
         """The silhouettes as the kernel reads them, with each view's mm per pixel at the body."""

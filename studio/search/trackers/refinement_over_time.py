@@ -65,9 +65,9 @@ class Window:
 class MovementRefiner:
     """Refines the poses of frames that follow each other."""
 
-    def __init__(self, refiner: Refiner, fps: float, acceleration: float, still: Sequence[int] = ()) -> None:
-        """acceleration : σ_a, m/s², above 0. still : numbers of parameters that stay as they are."""
-        self._refiner, self._body, self._still = refiner, refiner.body, list(still)
+    def __init__(self, refiner: Refiner, fps: float, acceleration: float) -> None:
+        """refiner : what is to stay as it is stays. acceleration : σ_a, m/s², above 0."""
+        self._refiner, self._body = refiner, refiner.body
         usual = acceleration * 1000.0 / fps**2
         self._weight = (RESIDUAL_MM / usual) ** 2 / len(body_points(self._body, refiner.body.neutral)[0])
 
@@ -133,7 +133,7 @@ class MovementRefiner:
         held = ((poses <= refiner.lower) & (here.gradient > 0.0)) | (
             (poses >= refiner.upper) & (here.gradient < 0.0)
         )
-        held[:, self._still] = True
+        held |= refiner.still
         free = np.where(held, 0.0, 1.0)
         diagonal = np.einsum("tii->ti", here.blocks[0])
         lift = damping * diagonal + 1e-9 * diagonal.mean() + 1e-12
@@ -145,7 +145,8 @@ class MovementRefiner:
                     block = block + np.diag(lift[t] * free[t] + held[t])
                 place_block(rows, block, t * size, (t - apart) * size)
         step = solve_banded(rows, -(here.gradient * free).ravel())
-        return np.clip(poses + step.reshape(count, size) * refiner.unit, refiner.lower, refiner.upper)
+        moved = np.clip(poses + step.reshape(count, size) * refiner.unit, refiner.lower, refiner.upper)
+        return np.where(refiner.still, poses, moved)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
