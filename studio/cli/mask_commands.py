@@ -69,15 +69,15 @@ def background_command(
     call: Call,
     source: str | None,
     plates: Sequence[str],
-    exclude: Sequence[str],
-    in_front: Sequence[str],
     quality: bool,
     frames: str,
     pictures: Path | None,
+    **regions: Sequence[str],
 ) -> dict[str, object]:
     session: Session = call.given["session"]
     if plates:
         session = _with_plates(session, plates)
+    exclude, in_front = regions["exclude"], regions["in_front"]
     for word in exclude:
         if word != UNUSED:
             paint_region(session, "exclusions", *_region("--exclude", word))

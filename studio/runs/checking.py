@@ -259,7 +259,9 @@ def kept_check(run: StoredRun, track: str) -> RunCheck | None:
 def frame_shares(
     body: BodyModel, cameras: tuple[Camera, ...], pose: Array, evidence: FrameEvidence
 ) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
-    """For each camera: the share of the model's pixels in the mask, and of the mask's pixels under the model."""
+    """For each camera: the share of the model's pixels in the mask, of those where it is known whether they are, and of
+    the mask's pixels under the model.
+    """
     views = {view.camera: view for view in evidence.views}
     inside: list[float | None] = []
     covered: list[float | None] = []
@@ -272,7 +274,8 @@ def frame_shares(
         mask = view.mask > 0
         model = projected_silhouette(contours, *mask.shape) > 0
         both = int(np.count_nonzero(mask & model))
-        inside.append(_share(both, int(np.count_nonzero(model))))
+        told = model if view.unknown is None else model & (view.unknown == 0)
+        inside.append(_share(both, int(np.count_nonzero(told))))
         covered.append(_share(both, int(np.count_nonzero(mask))))
     return tuple(inside), tuple(covered)
 

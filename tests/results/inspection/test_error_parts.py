@@ -14,7 +14,6 @@ from tracked_runs import finish
 import studio
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
-from studio.footage.capture.footage import EXCLUSIONS
 from studio.foundations.errors import NotFoundError, RunError, SessionError
 from studio.operations.inspecting import worst_frame
 from studio.results.evaluation.report import in_words
@@ -203,7 +202,7 @@ def test_a_search_of_a_frame_that_was_tracked_again_counts_no_more(own: Inspecte
 
 def test_a_search_before_other_masks_counts_no_more(own: InspectedRun) -> None:
     split(own, FRAME)
-    areas = own.session.path / EXCLUSIONS
+    areas = own.session.path / "exclusions"
     areas.mkdir()
     area = np.zeros((48, 64), np.uint8)
     area[:4] = 255

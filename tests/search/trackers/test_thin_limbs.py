@@ -26,6 +26,7 @@ from studio.search.trackers.agreement import Agreement
 from studio.search.trackers.frame_refinement import FrameRefinementSettings, FrameRefiner
 from studio.search.trackers.limb_resampling import Hypothesis, chains_of, thin_limbs_of
 from studio.search.trackers.limbs_elsewhere import Change, changes_by_camera
+from studio.search.trackers.refinement import RefinementSettings, Refiner
 from studio.search.trackers.thin_limbs import HALF_PLAIN, ThinLimb, lines_along
 from studio.search.trackers.tracker import Estimate, FrameResult, start_of
 
@@ -159,14 +160,15 @@ def test_older_runs_and_live_ones_do_not_follow_lines() -> None:
     assert live_changes({"thin_limbs": True})["thin_limbs"]
 
 
-def test_refining_a_clip_leaves_limbs_as_they_were_tracked_along_lines() -> None:
+def test_refining_a_clip_leaves_limbs_as_they_were_tracked_along_lines_where_a_camera_is_missing_too() -> (
+    None
+):
     work = object.__new__(_Work)
-    work._as_tracked, work._before, work._after = [1], [], []
-    work._track = SimpleNamespace(poses=np.zeros((1, 3)))
-    work._poses, work._agreement = np.zeros((1, 3)), np.zeros(1)
-    work._keep(0, np.ones(3), lambda pose: SimpleNamespace(overlap=pose.sum()))
-    np.testing.assert_array_equal(work._poses, [[1.0, 0.0, 1.0]])
-    assert work._after == [2.0]
+    work._cameras, work._knobs, work._still = SMALL, RefinementSettings(), [7]
+    work._refiner = Refiner(MOUSE, SMALL, work._knobs, work._still)
+    fewer = work._refiner_of(tuple(camera.name for camera in SMALL[:2]))
+    assert len(fewer.cameras) == 2
+    assert np.flatnonzero(fewer.still).tolist() == [7]
 
 
 @pytest.mark.parametrize(

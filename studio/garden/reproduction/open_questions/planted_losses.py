@@ -14,6 +14,7 @@ In frames with planted losses the network that knows people is asked; a run asks
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import SilhouetteDistances, distances_of
-from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.foundations.arrays import Array, Bytes, evenly_spread
 from studio.foundations.geometry.camera import Camera
 from studio.garden.drawn_recipes import CHOOSING, KINDS, clip_name
@@ -139,7 +140,7 @@ def plant(
         evidence = cache.evidence(session, cameras, int(frame), settings.evidence, "proximity")
         changed = tuple(changes_by_camera(evidence).values())
         pictures = {camera.name: footage.picture(camera.name, int(frame)) for camera in cameras}
-        seen = [distances_of(view.mask, POINTS) for view in evidence.views]
+        seen = _distances(evidence.views)
         truth = pose_on_truth(session, body, int(frame))
         pose = whole.refined(truth, seen)
         if lost_limbs(body, pose, truth):
@@ -151,7 +152,7 @@ def plant(
             draws = draws[[limb in lost_limbs(body, one, truth) for one in draws]]
             if not len(draws):
                 continue
-            bare = [distances_of(mask, POINTS) for mask in whole.erased(evidence, pose, limb)]
+            bare = _distances(whole.erased(evidence, pose, limb))
             few = seen[: len(three.cameras)]
             for cause, looking, masks, start in (
                 (MOVED, whole, seen, draws[0]),
@@ -164,6 +165,14 @@ def plant(
                 ended = looking.refined(start, masks)
                 if limb in lost_limbs(body, ended, truth):
                     yield cause, limb, *looking.names(ended, masks, changed, pictures)
+
+
+def _distances(views: Sequence[ViewEvidence]) -> list[SilhouetteDistances]:
+    """What a run and a check see of masks, with what is unknown."""
+    return [
+        distances_of(view.mask, POINTS, unknown=view.unknown, doubted=view.shadow is not None)
+        for view in views
+    ]
 
 
 def lost_limbs(body: BodyModel, pose: Array, truth: Array) -> set[str]:
@@ -236,10 +245,10 @@ class Looking:
         confirmed = self._agreement.confirmed(off, pose, seen)
         return tuple(by_run), tuple(contradicted_limbs(confirmed, elsewhere, reported))
 
-    def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[Bytes]:
-        """Each view's mask (H, W) without a limb of a pose, where no other limb of it lies."""
+    def erased(self, evidence: FrameEvidence, pose: Array, limb: str) -> list[ViewEvidence]:
+        """Each view, its mask without a limb of a pose, where no other limb of it lies."""
         corners = self._agreement.corners(pose)
-        erased_masks: list[Bytes] = []
+        erased: list[ViewEvidence] = []
         for view, quads, mm in zip(evidence.views, corners, self._agreement.mm_per_pixel(pose), strict=True):
             own, others = np.zeros_like(view.mask), np.zeros_like(view.mask)
             for name, quad in zip(limb_names(self.body), quads, strict=True):
@@ -247,8 +256,9 @@ class Looking:
                     cv2.fillPoly(own if name == limb else others, [np.rint(quad).astype(np.int32)], (255,))
             reach = 2 * round(FAR_MM / mm) + 1
             own = np.asarray(cv2.dilate(own, np.ones((reach, reach), np.uint8)), np.uint8)
-            erased_masks.append(np.where((own > 0) & (others == 0), np.uint8(0), view.mask))
-        return erased_masks
+            mask = np.where((own > 0) & (others == 0), np.uint8(0), view.mask)
+            erased.append(replace(view, mask=mask))
+        return erased
 
 
 WHO = {"a run": 1, "a check": 3}
