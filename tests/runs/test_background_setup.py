@@ -11,7 +11,7 @@ from toy_footage import write_video
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
 from studio.footage.capture.calibration_files import write_calibration
-from studio.foundations.errors import FootageError, NotFoundError, SettingsError
+from studio.foundations.errors import CalibrationError, FootageError, NotFoundError, SettingsError
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.geometry.projection import project
 from studio.results.drawing_footage.cameras import placed_camera
@@ -198,3 +198,24 @@ def test_medians_are_of_empty_frames_only() -> None:
     assert (out[6, 6] == 7).all()
     assert count[1, 2] == 2
     assert count[6, 6] == 0
+
+
+def test_masks_are_set_up_where_nothing_in_front_can_be_looked_for(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changed = set_backgrounds(session, plates(tmp_path, change=False))
+    thing = np.zeros(SIZE[::-1], np.uint8)
+    thing[:20, :30] = 255
+    place = "studio.runs.setup.background_setup.find_things_in_front"
+    monkeypatch.setattr(place, lambda *_: {"cam1": thing})
+    notes = set_up_background(changed, "plate", tune=False).notes
+    assert any("cam1: something stands in front" in note and "3.1 % of the picture" in note for note in notes)
+    assert read_evidence(changed).found_in_front == ["cam1"]
+
+    def refuse(*_: object) -> None:
+        raise CalibrationError("No two cameras see a common place.", "Check the size.")
+
+    monkeypatch.setattr(place, refuse)
+    notes = set_up_background(changed, "plate", tune=False).notes
+    assert notes == ("Nothing was looked for in front of the subject: No two cameras see a common place.",)
+    assert set_up_background(changed, "plate", tune=False, find_in_front=False).notes == ()

@@ -108,7 +108,7 @@ def test_masks_that_came_with_the_footage_can_be_chosen_again(
     (session.path / "evidence.json").write_text(
         json.dumps({"schema": 2, "knobs": {}, "given_masks": {f"cam{n}": "masks/cam1" for n in (1, 2, 3)}})
     )
-    set_up_background(Session(session.path), "masks", tune=False, find_in_front=False)
+    set_up_background(Session(session.path), "masks", tune=False)
     assert masks_in_use(session) == ("masks/cam1",) * 3
     assert read_evidence(session).knobs == {"background_model": "mask"}
     assert not (session.path / PERSON_MASKS).exists()

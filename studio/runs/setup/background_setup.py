@@ -35,7 +35,14 @@ from studio.footage.capture.footage import Footage
 from studio.footage.capture.footage_source import FootageSource
 from studio.footage.capture.pictures import is_picture, png_of
 from studio.foundations.arrays import Bytes
-from studio.foundations.errors import FootageError, RunError, SessionError, StudioError, WorkCancelledError
+from studio.foundations.errors import (
+    CalibrationError,
+    FootageError,
+    RunError,
+    SessionError,
+    StudioError,
+    WorkCancelledError,
+)
 from studio.foundations.geometry.camera import Camera
 from studio.foundations.progress import Progress, no_progress
 from studio.foundations.words import sentence
@@ -419,8 +426,14 @@ def _cut_to_subject(
 
 
 def _with_things_in_front(session: Session, made: BackgroundSetup, progress: Progress) -> BackgroundSetup:
-    """The session with the things that its masks show in front of the subject's place, and notes on them."""
-    found = find_things_in_front(session, painted_in_front(session), progress)
+    """The session with the things that its masks show in front of the subject's place, and notes on them. Where cameras
+    or masks allow no search, such as for a body of another size, a note says so.
+    """
+    try:
+        found = find_things_in_front(session, painted_in_front(session), progress)
+    except (CalibrationError, FootageError) as error:
+        note = f"Nothing was looked for in front of the subject: {error.message}"
+        return dataclasses.replace(made, notes=(*made.notes, note))
     use_found_in_front(session, found)
     notes = [
         f"{name}: something stands in front of the subject's place ({_share_in_words(thing)} of the picture). What it"
