@@ -46,6 +46,9 @@ from studio.sessions.provenance import origin_of
 from studio.sessions.session import Session
 from studio.sessions.stroke_files import read_strokes, strokes_of_file
 
+Regions = Mapping[str, ArrayLike | str | Path | None] | None
+"""By camera: a polygon (K, 2) of pixels, the path of a painted picture, or None for no region any more."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MaskRequest:
@@ -58,7 +61,7 @@ class MaskRequest:
         Web(left_out=True),
     ] = None
     exclude: Annotated[
-        Mapping[str, ArrayLike | str | Path | None] | None,
+        Regions,
         Field(
             description="By camera, the region that does not count: a polygon (K, 2) of pixels or the path of a"
             " painted picture; None removes it."
@@ -67,7 +70,7 @@ class MaskRequest:
         Web(left_out=True),
     ] = None
     in_front: Annotated[
-        Mapping[str, ArrayLike | str | Path | None] | None,
+        Regions,
         Field(
             description="By camera, where a thing stands in front of the subject's place (a table, a pole), so that"
             " it cannot be told what is there: a polygon or a painted picture, as for `exclude`."

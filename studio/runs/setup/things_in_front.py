@@ -14,7 +14,7 @@ behind is not found, and need not be.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from studio.body.scale import scale_of
 from studio.evidence.frame_evidence import ViewEvidence
-from studio.evidence.masks import disc, reduced
+from studio.evidence.masks import cleaned, disc, reduced, uncleaned
+from studio.evidence.settings import EvidenceSettings
 from studio.evidence.volume.hull import Hull
 from studio.evidence.volume.hull_pieces import chosen_voxels
 from studio.evidence.volume.hull_settings import HullSettings
@@ -257,9 +258,7 @@ def _wider(mask: Bytes) -> Bytes:
 
 def _large(mask: Bytes, least: float) -> Bytes:
     """The pieces of a mask with more pixels than `least`."""
-    count, labels, figures, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    kept = [piece for piece in range(1, count) if figures[piece, cv2.CC_STAT_AREA] > least]
-    return np.where(np.isin(labels, kept), np.uint8(255), np.uint8(0))
+    return cleaned(mask, replace(uncleaned(EvidenceSettings()), mask_min_component=int(least) + 1))
 
 
 def _grown(mask: Bytes, shown: Flags, by: float) -> Bytes:
